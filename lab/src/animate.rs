@@ -8,13 +8,16 @@
 
 use core::f64::consts::TAU;
 use core::fmt;
+use core::sync::atomic::{AtomicU64, Ordering};
 use std::io::{self, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Config, Grid, Hit, Method, Object, Ray, Scene as Instances, TriangleMesh, refit};
+use hgrid_core::{
+    Config, Grid, Hit, INVALID_ID, Method, Object, Ray, Scene as Instances, TriangleMesh, refit,
+};
 use serde::Serialize;
 
 use crate::camera::Up;
@@ -22,8 +25,10 @@ use crate::cli::AnimateArgs;
 use crate::field::{self, Field, Memory};
 use crate::image;
 use crate::measure::median;
+use crate::plural::{self, counted};
 use crate::progress::Progress;
 use crate::regions::Regions;
+use crate::render::unseen;
 use crate::scene::{Bounds, Scene};
 use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
@@ -38,7 +43,7 @@ const WAVELENGTH: f64 = 0.3;
 /// Animates and prints.
 ///
 /// # Errors
-/// If the scene cannot be loaded or built, or a picture cannot be written.
+/// If the scene cannot be loaded or built, no picture shows anything, or a picture cannot be written.
 pub fn run(args: &AnimateArgs) -> Result<()> {
     for (option, is_there) in [("--instances", args.instances > 0), ("--refit", args.refit)] {
         let is_known = !is_there || args.method == Method::Bvh;
@@ -49,7 +54,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         "--refit is for later frames than the first: ask for --frames 2 or more, or leave out --refit"
     );
     let scene = Scene::load(&args.scene)?;
-    ensure!(!scene.indices.is_empty(), "`{}` has no triangles: nothing to animate", args.scene);
+    let name = args.scene.display();
+    ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
     if let Some(folder) = &args.output {
         image::make_folder(folder)?;
     }
@@ -68,9 +74,10 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     };
     let is_refitted = args.refit;
     let plan = Plan { frames: args.frames, config, tiles, threads: &threads, field, is_refitted };
-    let report = animate(&scene, &plan, write, &mut progress)
-        .with_context(|| format!("cannot animate `{}`", args.scene))?;
+    let cannot = || format!("cannot animate `{name}`");
+    let (report, hits) = animate(&scene, &plan, write, &mut progress).with_context(cannot)?;
     drop(progress);
+    ensure!(hits > 0, "{}: {}", cannot(), unseen(&args.picture, &scene, None));
 
     let mut out = io::stdout();
     if args.json {
@@ -79,7 +86,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         writeln!(out, "{report}")?;
     }
     if let Some(folder) = &args.output {
-        writeln!(io::stderr(), "wrote {} pictures into {}", args.frames, folder.display())?;
+        let pictures = counted(args.frames, "picture", "pictures");
+        writeln!(io::stderr(), "wrote {pictures} into {}", folder.display())?;
     }
     Ok(())
 }
@@ -145,9 +153,9 @@ pub struct Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { scene, triangles, instances, method, threads, size, .. } = self;
-        write!(f, "{scene}: {triangles} triangles, ")?;
+        write!(f, "{scene}: {}, ", plural::triangles(*triangles))?;
         if *instances > 0 {
-            write!(f, "{instances} instances, ")?;
+            write!(f, "{}, ", counted(*instances, "instance", "instances"))?;
         }
         let (refitted, plural) = (
             if self.is_refitted { ", refitted" } else { "" },
@@ -172,18 +180,18 @@ impl fmt::Display for Report {
         write!(f, "\nThe grid took up to {mebibytes:.1} MiB")?;
         match self.grown {
             0 => f.write_str(" of memory that was there from the first frame on."),
-            grown => write!(f, "; its memory grew {grown} times."),
+            grown => write!(f, "; its memory grew {}.", counted(grown, "time", "times")),
         }
     }
 }
 
-/// Runs all frames and shows each picture.
+/// Runs all frames and shows each picture. Returns the number of rays that hit something, too.
 fn animate(
     scene: &Scene,
     plan: &Plan<'_>,
     mut show: impl FnMut(u32, &[Rgb]) -> Result<()>,
     progress: &mut Progress,
-) -> Result<Report> {
+) -> Result<(Report, u64)> {
     let wave = Wave::new(scene);
     let mut positions = scene.positions.clone();
     let mut pixels = vec![[0; 3]; plan.tiles.pixels()];
@@ -194,7 +202,7 @@ fn animate(
         _ => Config::default(),
     };
     let mut memory = Memory::new(instances, &tree, plan.threads.count())?;
-    let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
+    let (mut frames, mut index_bytes, mut grown, mut hits) = (Vec::new(), 0, 0, 0);
     for number in 0..plan.frames {
         let start = Instant::now();
         wave.at(scene, f64::from(number) / f64::from(plan.frames), &mut positions);
@@ -231,7 +239,7 @@ fn animate(
         };
         let scene_ms = field.map_or(0.0, |_| milliseconds(placing));
         let rendering = Instant::now();
-        render(&grid, field.as_ref(), plan, &mut pixels);
+        hits += render(&grid, field.as_ref(), plan, &mut pixels);
         frames.push(Frame {
             build_ms,
             scene_ms,
@@ -243,7 +251,7 @@ fn animate(
         progress.advance(1);
     }
     let middle = |time: fn(&Frame) -> f64| median(&frames.iter().map(time).collect::<Vec<_>>());
-    Ok(Report {
+    let report = Report {
         scene: scene.name.clone(),
         triangles: scene.indices.len(),
         instances,
@@ -260,30 +268,41 @@ fn animate(
             frame_ms: middle(|frame| frame.frame_ms),
         },
         frames,
-    })
+    };
+    Ok((report, hits))
 }
 
 fn milliseconds(start: Instant) -> f64 {
     1000.0 * start.elapsed().as_secs_f64()
 }
 
-/// Traces and shades all pixels, a band of tiles at a time.
+/// Traces and shades all pixels, a band of tiles at a time; returns the number of rays that hit something.
 #[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
-fn render(grid: &Grid<'_>, field: Option<&Instances<'_>>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
+fn render(
+    grid: &Grid<'_>,
+    field: Option<&Instances<'_>>,
+    plan: &Plan<'_>,
+    pixels: &mut [Rgb],
+) -> u64 {
     let shader = Shader::new(*grid.mesh(), &plan.tiles.camera);
     let bands: Vec<_> = plan.tiles.bands(pixels).map(Mutex::new).collect();
+    let hit = AtomicU64::new(0);
     plan.threads.each(bands.len() as u32, |at| {
         let Some(Ok(mut band)) = bands.get(at as usize).map(|band| band.lock()) else { return };
         let mut hits = [Hit::MISS; TILE_RAYS];
         band.fill(|rays: &[Ray], colors: &mut [Rgb]| {
-            if let Some(field) = field {
-                return field::shade(field, &plan.tiles.camera, rays, colors);
-            }
             let hits = &mut hits[..rays.len()];
-            intersect(grid, rays, hits);
-            shader.diffuse(rays, hits, colors);
+            if let Some(field) = field {
+                field::shade(field, &plan.tiles.camera, rays, hits, colors);
+            } else {
+                intersect(grid, rays, hits);
+                shader.diffuse(rays, hits, colors);
+            }
+            let count = hits.iter().filter(|hit| hit.primitive != INVALID_ID).count();
+            hit.fetch_add(count as u64, Ordering::Relaxed);
         });
     });
+    hit.into_inner()
 }
 
 /// The wave in which the vertices of a scene swing.
@@ -370,7 +389,8 @@ mod tests {
             pictures.push(pixels.to_vec());
             Ok(())
         };
-        let report = animate(&scene, &plan, show, &mut Progress::new("", 0)).unwrap();
+        let (report, hits) = animate(&scene, &plan, show, &mut Progress::new("", 0)).unwrap();
+        assert!(hits > 0);
         (report, pictures)
     }
 
@@ -441,7 +461,8 @@ mod tests {
         let config = Config::new(Method::Bvh);
         let (tiles, field) = (Tiles { camera, size: 3 }, None);
         let plan = Plan { frames: 2, config, tiles, threads: &threads, field, is_refitted: false };
-        let report = animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
-        assert_eq!(report.frames.len(), 2);
+        let (report, hits) =
+            animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
+        assert_eq!((report.frames.len(), hits), (2, 0));
     }
 }

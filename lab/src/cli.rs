@@ -138,7 +138,7 @@ pub enum Command {
 pub struct TableArgs {
     /// Mesh files or procedural:NAME:TRIANGLES, one column each
     #[arg(required = true)]
-    pub scenes: Vec<String>,
+    pub scenes: Vec<OsString>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub race: Race,
@@ -155,13 +155,13 @@ pub struct TableArgs {
 pub struct FiguresArgs {
     /// Mesh files or procedural:NAME:TRIANGLES, one group of bars each
     #[arg(required = true)]
-    pub scenes: Vec<String>,
+    pub scenes: Vec<OsString>,
     /// The folder for the pictures and their numbers; it is made if it is missing
     #[arg(short, long, value_name = "DIR", default_value = DEFAULT_FOLDER)]
     pub output: PathBuf,
     /// The scene of figure 1 [default: the first one]
     #[arg(long, value_name = "SCENE")]
-    pub figure1: Option<String>,
+    pub figure1: Option<OsString>,
     /// The densities of figure 1, between commas
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_delimiter = ',',
           default_values_t = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])]
@@ -176,7 +176,7 @@ pub struct FiguresArgs {
 pub struct AnimateArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
     #[arg(default_value = DEFAULT_SCENE)]
-    pub scene: String,
+    pub scene: OsString,
     /// Number of frames
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 30,
           value_parser = whole(1..=100_000_u32))]
@@ -214,7 +214,7 @@ pub struct AnimateArgs {
 pub struct CompareArgs {
     /// Mesh files or procedural:NAME:TRIANGLES
     #[arg(required = true)]
-    pub scenes: Vec<String>,
+    pub scenes: Vec<OsString>,
     /// The structures of hgrid, between commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     pub methods: Vec<Method>,
@@ -289,7 +289,7 @@ pub struct ReportArgs {
 #[derive(Debug, Parser)]
 pub struct FirstBuildArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
-    pub scene: String,
+    pub scene: OsString,
     /// A method or a peer
     pub system: String,
     /// Build a scene of so many instances over it, too

@@ -157,10 +157,16 @@ static CORNERS: [[u32; 3]; TILE_RAYS] = {
 };
 
 /// Traces the rays of a tile through a scene and shades the hits as a mesh of its own: each ray brings the
-/// triangle that it hits, transformed as its instance is.
-pub(crate) fn shade(scene: &Scene<'_>, camera: &Camera, rays: &[Ray], colors: &mut [Rgb]) {
+/// triangle that it hits, transformed as its instance is. `hits` tells which rays hit something.
+pub(crate) fn shade(
+    scene: &Scene<'_>,
+    camera: &Camera,
+    rays: &[Ray],
+    hits: &mut [Hit],
+    colors: &mut [Rgb],
+) {
     let mut corners = [[0.0; 3]; 3 * TILE_RAYS];
-    let mut hits = [Hit::MISS; TILE_RAYS];
+    hits.fill(Hit::MISS);
     let places = hits.iter_mut().zip(corners.as_chunks_mut::<3>().0);
     for (number, (ray, (to, corners))) in (0..).zip(rays.iter().zip(places)) {
         let Some(hit) = scene.intersect(&RayF64::from(ray)) else { continue };
@@ -174,7 +180,7 @@ pub(crate) fn shade(scene: &Scene<'_>, camera: &Camera, rays: &[Ray], colors: &m
         *to = Hit { t: hit.t, u: hit.u, v: hit.v, primitive: number };
     }
     let Ok(mesh) = TriangleMesh::new(&corners, &CORNERS) else { return };
-    Shader::new(mesh, camera).diffuse(rays, &hits[..rays.len()], colors);
+    Shader::new(mesh, camera).diffuse(rays, hits, colors);
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! itself is written in a single write when the picture is complete.
 
 use core::iter;
+use std::ffi::OsStr;
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};
 use std::path::{Path, is_separator};
@@ -51,15 +52,17 @@ pub fn check_writable(path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// If the output is one of them.
-pub fn check_sources(output: &Path, scene: &str, what: &str) -> Result<()> {
+pub fn check_sources(output: &Path, scene: &OsStr, what: &str) -> Result<()> {
     let Ok(target) = output.canonicalize() else { return Ok(()) };
-    for input in iter::once(scene).chain(scene.split('+')) {
+    let two = scene.to_str().unwrap_or_default().split('+').map(OsStr::new);
+    for path in iter::once(scene).chain(two).map(Path::new) {
+        let input = path.display();
         let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == target);
         ensure!(
-            !is_output(Path::new(input)),
+            !is_output(path),
             "`{input}` would be overwritten by its own {what}: name another file"
         );
-        let buffers = files_of(Path::new(input));
+        let buffers = files_of(path);
         ensure!(
             !buffers.iter().any(|file| is_output(file)),
             "`{}` holds a part of `{input}`, whose {what} would overwrite it: name another file",

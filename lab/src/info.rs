@@ -1,5 +1,6 @@
 //! The content of a file, a mesh or a blob: the `info` command.
 
+use std::ffi::OsStr;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -11,6 +12,7 @@ use serde::Serialize;
 use crate::blob::Blob;
 use crate::camera::Up;
 use crate::cli::blob::InfoArgs;
+use crate::plural::triangles;
 use crate::scene::format::Format;
 use crate::scene::{Scene, read_model};
 use crate::shade::normal_of;
@@ -121,10 +123,11 @@ struct GridFacts {
 }
 
 impl Facts {
-    fn of(file: &str) -> Result<Self> {
+    fn of(file: &OsStr) -> Result<Self> {
         let path = Path::new(file);
+        let file = &*file.to_string_lossy();
         if file.starts_with("procedural:") || !path.exists() {
-            let scene = Scene::load(file)?;
+            let scene = Scene::load(path)?;
             let parts = scene.geometries.len().max(1);
             let format = if parts > 1 { "A+B" } else { "formula" };
             return Ok(Self::Mesh(MeshFacts::of(file, format, [parts; 2], &scene)));
@@ -139,6 +142,7 @@ impl Facts {
         let mesh =
             model.flatten().context("it has more than 2^32 vertices").with_context(cannot)?;
         let scene = Scene {
+            of_triangles: mesh.bounds(),
             positions: mesh.positions,
             indices: mesh.indices,
             is_z_up: format.is_z_up(),
@@ -175,9 +179,7 @@ impl MeshFacts {
             ("without area", self.triangles_without_area),
         ];
         let flaws = flaws.into_iter().filter(|&(_, number)| number > 0);
-        all.into_iter()
-            .chain(flaws.map(|(name, n)| (name, format!("{} triangles", count(n)))))
-            .collect()
+        all.into_iter().chain(flaws.map(|(name, n)| (name, triangles(n)))).collect()
     }
 
     fn of(
@@ -246,8 +248,8 @@ impl BlobFacts {
                 ("lists", count(grid.lists)),
                 ("longest list", count(grid.longest_list)),
                 ("references", count(grid.references)),
-                ("not finite", format!("{} triangles", count(grid.triangles_not_finite))),
-                ("without area", format!("{} triangles", count(grid.triangles_without_area))),
+                ("not finite", triangles(grid.triangles_not_finite)),
+                ("without area", triangles(grid.triangles_without_area)),
                 ("content hash", grid.content_hash.clone()),
             ]);
         }
@@ -335,7 +337,7 @@ mod tests {
 
     #[test]
     fn scenes_of_two_and_of_nothing_are_described() {
-        let facts = Facts::of("procedural:knot:800+procedural:soup:600").unwrap();
+        let facts = Facts::of("procedural:knot:800+procedural:soup:600".as_ref()).unwrap();
         let rows = facts.rows();
         assert!(rows.contains(&("format", "A+B".to_owned())), "{rows:?}");
         assert!(rows.contains(&("meshes", "2".to_owned())), "{rows:?}");

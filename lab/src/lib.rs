@@ -34,6 +34,7 @@ pub mod measure;
 pub mod pack;
 pub mod pages;
 mod plot;
+mod plural;
 pub mod progress;
 mod regions;
 pub mod render;

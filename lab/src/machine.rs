@@ -44,7 +44,7 @@ impl Machine {
             rustc: rustc_version_runtime::version().to_string(),
             commit: commit(),
             date: now,
-            command: command(env::args()),
+            command: command(env::args_os().map(|word| word.to_string_lossy().into_owned())),
         }
     }
 

@@ -26,6 +26,7 @@ use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{Config, Counters, Grid, Hit, Method, QueryOptions, Ray, TriangleMesh};
 use serde::{Deserialize, Serialize};
 
+use crate::plural::counted;
 use crate::progress::Progress;
 use crate::regions::{Regions, peak_bytes};
 use crate::scene::Scene;
@@ -235,7 +236,8 @@ pub fn measure(
                 let work = count(&grid, &tiles, &cost, progress);
                 if let Some(first) = outcome.measurements.first() {
                     let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
-                    ensure!(differ == 0, "{} and {name} differ in {differ} pixels", first.method);
+                    let pixels = counted(differ, "pixel", "pixels");
+                    ensure!(differ == 0, "{} and {name} differ in {pixels}", first.method);
                 }
                 let samples = [&**builds, renders];
                 outcome

@@ -14,6 +14,7 @@ use indicatif::HumanCount;
 use crate::blob::Blob;
 use crate::cli::blob::PackArgs;
 use crate::image::{check_sources, check_writable};
+use crate::plural::triangles;
 use crate::regions::Regions;
 use crate::scene::Scene;
 use crate::scene::format::Format;
@@ -30,7 +31,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
-    let cannot = || format!("cannot pack `{}`", args.scene);
+    let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
     let blob = pack(&scene, &config).with_context(cannot)?;
     let written = match &args.c_array {
@@ -45,11 +46,11 @@ pub fn run(args: &PackArgs) -> Result<()> {
     };
     written.with_context(|| format!("cannot write `{}`", args.output.display()))?;
     let bytes = HumanCount(blob.bytes().len() as u64);
-    let triangles = HumanCount(scene.indices.len() as u64);
+    let triangles = triangles(scene.indices.len());
     let (output, method) = (args.output.display(), args.method.name());
     writeln!(
         io::stdout(),
-        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles} triangles"
+        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles}"
     )?;
     Ok(())
 }

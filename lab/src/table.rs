@@ -3,6 +3,7 @@
 //! Rows come in groups, one for each method, and scenes are columns, as in the paper. Below the paper's six
 //! rows of a method are its bytes, which the paper shows only in a chart.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result, ensure};
@@ -14,6 +15,7 @@ use crate::cli::{Race, TableArgs};
 use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::progress::Progress;
+use crate::render::unseen;
 use crate::scene::Scene;
 use crate::shade::Shade;
 use crate::threads::Threads;
@@ -65,13 +67,13 @@ impl Results {
     ///
     /// # Errors
     /// The errors of [`run`].
-    pub fn measure(scenes: &[String], race: &Race) -> Result<Self> {
+    pub fn measure(scenes: &[OsString], race: &Race) -> Result<Self> {
         let configs = race.configs();
         let size = race.picture.size;
         let total = scenes.len() as u64 * rows(size, configs.len(), race.repeat);
         let mut progress = Progress::new("starting", total);
         let scenes = scenes.iter().map(|spec| {
-            let scene = Scene::load(spec)?;
+            let (scene, spec) = (Scene::load(spec)?, spec.display());
             ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
             let facts = SceneFacts::of(&scene);
             progress.set_scope(&display_name(&facts.scene));
@@ -209,7 +211,10 @@ pub(crate) fn measure_diffuse(
     let subject = Subject { mesh, tiles: race.picture.tiles(scene)?, threads: &threads };
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
-    Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
+    let measurements = measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements;
+    let is_seen = measurements.iter().all(|measurement| measurement.hits > 0);
+    ensure!(is_seen, unseen(&race.picture, scene, None));
+    Ok(measurements)
 }
 
 /// Formats a table as Markdown, with its first columns of words aligned to the left.
@@ -325,6 +330,15 @@ mod tests {
             let message = format!("{:#}", results(words).unwrap_err());
             assert!(message.contains(words.split(' ').next().unwrap()), "{message}");
         }
+    }
+
+    #[test]
+    fn a_picture_that_shows_nothing_is_not_measured() {
+        let words = "procedural:knot:500 --size 16 --repeat 1 --eye 9,9,9 --target 10,10,10";
+        let message = format!("{:#}", results(words).unwrap_err());
+        let expected =
+            "cannot measure `procedural:knot:500`: no ray hits anything; look from elsewhere";
+        assert!(message.starts_with(expected), "{message}");
     }
 
     #[test]

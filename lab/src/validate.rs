@@ -10,6 +10,7 @@ use indicatif::HumanCount;
 
 use crate::blob::Blob;
 use crate::cli::blob::ValidateArgs;
+use crate::plural::{counted, triangles};
 use crate::render::seconds;
 use crate::scene::Scene;
 
@@ -38,7 +39,7 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
         "`{file}` has no mesh in it: name the file that it was built for, by --mesh"
     );
     ensure!(!info.has_mesh || args.mesh.is_none(), "`{file}` has its mesh in it: leave out --mesh");
-    let scene = args.mesh.as_deref().map(Scene::load).transpose()?;
+    let scene = args.mesh.as_ref().map(Scene::load).transpose()?;
     let opened = match &scene {
         Some(scene) => TriangleMesh::new(&scene.positions, &scene.indices)
             .and_then(|mesh| Grid::open(blob.bytes(), mesh)),
@@ -48,13 +49,10 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let start = Instant::now();
     grid.validate(&mut vec![0; grid.validate_bytes()])
         .with_context(|| format!("`{file}` is not valid"))?;
-    let (method, triangles) = (grid.method().name(), HumanCount(info.triangle_count.into()));
+    let (method, triangles) = (grid.method().name(), triangles(info.triangle_count));
     let time = seconds(start.elapsed().as_secs_f64());
     let rest = rest(&blob, &info);
-    writeln!(
-        io::stdout(),
-        "{file}: valid, a {method} of {triangles} triangles, proved in {time}{rest}"
-    )?;
+    writeln!(io::stdout(), "{file}: valid, a {method} of {triangles}, proved in {time}{rest}")?;
     Ok(())
 }
 
@@ -77,12 +75,12 @@ fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
     let start = Instant::now();
     let scene = Instances::open_packed_proven(bytes, &mut members, &mut objects, &mut scratch)
         .with_context(|| format!("`{file}` is not valid"))?;
-    let [instances, shown] =
-        [scene.instance_count(), info.triangle_count].map(|count| HumanCount(count.into()));
+    let instances = counted(scene.instance_count(), "instance", "instances");
+    let shown = counted(info.triangle_count, "grid or scene", "grids and scenes");
     let (time, rest) = (seconds(start.elapsed().as_secs_f64()), rest(blob, info));
     writeln!(
         io::stdout(),
-        "{file}: valid, a scene of {instances} instances with {shown} grids and scenes, proved in {time}{rest}"
+        "{file}: valid, a scene of {instances} with {shown}, proved in {time}{rest}"
     )?;
     Ok(())
 }

@@ -148,6 +148,18 @@ fn an_animation_needs_triangles_and_makes_no_folder_without() {
 }
 
 #[test]
+fn an_animation_that_shows_nothing_is_an_error() {
+    let folder = Folder::new("unseen").unwrap();
+    for words in ["", "--instances 4", "--method fixed"] {
+        let words =
+            format!("animate a.obj {words} --frames 2 --size 9 --eye 9,9,9 --target 99,9,9");
+        let said = folder.fails(&words).unwrap();
+        let expected = "cannot animate `a.obj`: no ray hits anything; look from elsewhere";
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+}
+
+#[test]
 fn what_is_no_file_is_refused() {
     let folder = Folder::new("kinds").unwrap();
     for command in ["info", "render", "validate"] {
@@ -162,6 +174,35 @@ fn what_is_no_file_is_refused() {
             let expected = "it is a pipe or a device: write what it holds into a file";
             assert!(said.contains(expected), "{said}");
         }
+    }
+}
+
+/// The name of a file need not be text: output shows what can be shown of it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_is_no_text_names_a_file() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = Folder::new("names").unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.obj");
+    fs::copy(folder.0.join("a.obj"), folder.0.join(name)).unwrap();
+    for (options, expected) in [
+        ("render --size 16", "caf\u{fffd}.obj: 3 triangles"),
+        ("info --json", "\"file\": \"caf\u{fffd}.obj\""),
+        ("pack -o a.hgrid", "wrote a.hgrid"),
+        ("animate --size 16 --frames 1", "caf\u{fffd}.obj: 3 triangles"),
+        ("table --size 16 --repeat 1 --methods bvh", "caf\u{fffd}"),
+        ("table --size 16 --repeat 1 --methods bvh --json", "caf\u{fffd}.obj"),
+        ("figures --size 16 --repeat 1 --methods fixed --densities 4", "figure2"),
+        ("first-build --instances 2", "seconds"),
+    ] {
+        let (program, mut words) = (env!("CARGO_BIN_EXE_hgrid"), options.split(' '));
+        let mut command = Command::new(program);
+        let command = command.current_dir(&folder.0).args(words.next()).arg(name).args(words);
+        let command = if options.starts_with("first") { command.arg("bvh") } else { command };
+        let output = command.output().unwrap();
+        let [said, error] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+        assert!(output.status.success() && said.contains(expected), "{options}: {said} {error}");
     }
 }
 
@@ -216,6 +257,28 @@ fn packed_files_are_described_proved_and_rendered() {
     assert!(folder.fails("validate a.obj").unwrap().contains("not a blob"));
     assert!(folder.fails("validate a.hgrid --mesh a.obj").unwrap().contains("leave out --mesh"));
     assert!(folder.fails("info nothing.hgrid").unwrap().contains("cannot open it"));
+}
+
+#[test]
+fn one_triangle_is_no_plural() {
+    let folder = Folder::new("one").unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    fs::write(folder.0.join("one.obj"), format!("{corners}f 1 2 3\n")).unwrap();
+    fs::write(folder.0.join("flat.obj"), format!("{corners}f 1 2 3\nf 1 1 1\n")).unwrap();
+    fs::write(folder.0.join("nan.obj"), format!("{corners}v nan 0 0\nf 1 2 3\nf 1 2 4\n")).unwrap();
+    for (words, expected) in [
+        ("render one.obj --size 16", "one.obj: 1 triangle, 3 vertices, "),
+        ("render one.obj --size 16 --method fixed --ao 0 --no-shadows", "; 256 rays in "),
+        ("render nan.obj --size 16", "; one triangle that is not finite is left out"),
+        ("info flat.obj", "without area  1 triangle\n"),
+        ("pack one.obj -o one.hgrid", "its mesh of 1 triangle\n"),
+        ("validate one.hgrid", "valid, a bvh of 1 triangle, proved"),
+        ("animate one.obj --size 16 --frames 1", "one.obj: 1 triangle, bvh"),
+        ("animate a.obj --size 16 --frames 1 --instances 1", "a.obj: 3 triangles, 1 instance, bvh"),
+    ] {
+        let said = folder.says(words).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
 }
 
 #[test]

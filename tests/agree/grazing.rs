@@ -72,7 +72,7 @@ fn placed(objects: usize, random: &mut Random) -> Instance {
 }
 
 /// Compares all queries of a scene with the answers of its instances alone; returns the number of hits.
-fn compare(instances: &[Instance], objects: &[Object<'_>], rays: &[RayF64]) -> usize {
+pub(crate) fn compare(instances: &[Instance], objects: &[Object<'_>], rays: &[RayF64]) -> usize {
     let alone = Alone::new(instances, objects);
     let built = Built::scene(instances, objects, &Config::default()).unwrap();
     let scene = built.open(objects).unwrap();

@@ -20,4 +20,5 @@ mod scene_surfaces;
 mod scenes;
 mod snapped;
 mod surfaces;
+mod ties;
 mod watertight;

@@ -283,12 +283,13 @@ impl Seen {
     }
 
     /// The `t` of the object's ray up to which hits matter, once the scene's ray has a hit at `t`. It is no less than
-    /// that of any hit in the object that has the same `t` in the scene.
+    /// that of any hit in the object that has the same `t` in the scene: such a hit comes before the next `t`, and its
+    /// own is a number in f32, so rounding does not put the end before it.
     ///
     /// For triangles it must not end the range of `inside`, the object's ray, because the exact place of a hit decides
     /// about the range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.
     pub(super) fn until(&self, t: f32, inside: &Ray) -> f32 {
-        let until = round(f64::from(t.next_up()) * self.scale - self.shift).next_up();
+        let until = round(f64::from(t.next_up()) * self.scale - self.shift);
         lesser(until, inside.t_max)
     }
 

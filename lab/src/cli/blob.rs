@@ -1,5 +1,6 @@
 //! The arguments of `hgrid info`, `hgrid pack` and `hgrid validate`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Parser;
@@ -11,7 +12,7 @@ use super::{Tuning, method_parser};
 #[derive(Debug, Parser)]
 pub struct InfoArgs {
     /// A mesh file, a blob or procedural:NAME:TRIANGLES
-    pub file: String,
+    pub file: OsString,
     /// Print the facts as a JSON object
     #[arg(long)]
     pub json: bool,
@@ -21,7 +22,7 @@ pub struct InfoArgs {
 #[derive(Debug, Parser)]
 pub struct PackArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
-    pub scene: String,
+    pub scene: OsString,
     /// The file to write
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -46,5 +47,5 @@ pub struct ValidateArgs {
     pub blob: PathBuf,
     /// The mesh that a blob without one was built for
     #[arg(long, value_name = "FILE")]
-    pub mesh: Option<String>,
+    pub mesh: Option<OsString>,
 }

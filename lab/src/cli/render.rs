@@ -1,6 +1,7 @@
 //! The arguments of `hgrid render`.
 
 use core::num::NonZero;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::thread;
 
@@ -22,7 +23,7 @@ const SKY_RAYS: u16 = 4;
 pub struct RenderArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
     #[arg(default_value = DEFAULT_SCENE)]
-    pub scene: String,
+    pub scene: OsString,
     /// The picture to write, as PNG
     #[arg(short, long, value_name = "FILE.png", default_value = DEFAULT_OUTPUT)]
     pub output: PathBuf,

@@ -7,7 +7,7 @@ use core::ops::RangeInclusive;
 use anyhow::{Result, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use hgrid_core::{Config, Control, Method, Parameters, Quality};
+use hgrid_core::{Config, Control, MAX_DEPTH, Method, Parameters, Quality};
 
 /// Parameters of single methods.
 #[derive(Debug, Clone, Copy, Args)]
@@ -46,10 +46,11 @@ impl Tuning {
         density.map_or(parameters, |density| parameters.with_density(density)).into()
     }
 
-    /// Refuses parameters of methods that are not built. `choice` is the option that chooses methods.
+    /// Refuses parameters of methods that are not built, and those outside their range. `choice` is the option that
+    /// chooses methods.
     ///
     /// # Errors
-    /// If there is one; the message names the parameter and its method.
+    /// If there is one; the message names the parameter, and its method or its range.
     pub fn check(&self, choice: &str, methods: &[Method]) -> Result<()> {
         for (option, is_there, method) in [
             ("--macrocell-factor", self.macrocell_factor.is_some(), Method::Fixed),
@@ -63,6 +64,11 @@ impl Tuning {
                 method.name()
             );
         }
+        // The core would refuse these two by the names of its fields.
+        let is_macrocell = self.macrocell_factor.is_none_or(|cells| cells >= 2);
+        ensure!(is_macrocell, "--macrocell-factor must be at least 2");
+        let is_depth = self.depth.is_none_or(|depth| (1..=MAX_DEPTH).contains(&depth));
+        ensure!(is_depth, "--depth must be 1 to {MAX_DEPTH}");
         Ok(())
     }
 }

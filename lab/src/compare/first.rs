@@ -4,6 +4,7 @@
 //! for every first build; that process loads the scene, builds, and prints the time.
 
 use std::env;
+use std::ffi::OsStr;
 use std::io::{self, Write as _};
 use std::process::{Command, Stdio};
 
@@ -49,7 +50,7 @@ pub fn run(args: &FirstBuildArgs) -> Result<()> {
 ///
 /// # Errors
 /// If the scene cannot be loaded, or the structure not be built.
-pub fn in_this_process(scene: &str, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_this_process(scene: &OsStr, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
     let scene = Scene::load(scene)?;
     let field = Field::over(&scene, shown.instances());
     let input = Input::of(scene, shown, field.as_ref());
@@ -69,10 +70,10 @@ pub fn in_this_process(scene: &str, shown: Shown, system: &dyn System) -> Result
 ///
 /// # Errors
 /// If that process fails.
-pub fn in_new_process(scene: &str, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_new_process(scene: &OsStr, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
     let program = env::current_exe().context("this program has no file")?;
     let mut command = Command::new(program);
-    command.args([COMMAND, scene, &system.name()]);
+    command.arg(COMMAND).arg(scene).arg(system.name());
     command.args(shown.words()).stderr(Stdio::inherit());
     let output = command.output().context("cannot start a process for a first build")?;
     ensure!(output.status.success(), "the process for a first build failed");
@@ -85,18 +86,17 @@ mod tests {
 
     #[test]
     fn a_first_build_takes_time_and_names_what_is_missing() {
-        let system = system_named("one-level").unwrap();
-        let first = in_this_process("procedural:knot:500", Shown::Mesh, system.as_ref()).unwrap();
+        let (system, knot) = (system_named("one-level").unwrap(), "procedural:knot:500".as_ref());
+        let first = in_this_process(knot, Shown::Mesh, system.as_ref()).unwrap();
         assert!(first.seconds > 0.0);
         let system = system_named("bvh").unwrap();
-        let field =
-            in_this_process("procedural:knot:500", Shown::Instances(9), system.as_ref()).unwrap();
+        let field = in_this_process(knot, Shown::Instances(9), system.as_ref()).unwrap();
         assert!(field.seconds > 0.0);
-        let spheres = in_this_process("procedural:knot:500", Shown::Spheres, system.as_ref());
+        let spheres = in_this_process(knot, Shown::Spheres, system.as_ref());
         assert!(spheres.unwrap().seconds > 0.0);
         let json = serde_json::to_string(&first).unwrap();
         assert_eq!(serde_json::from_str::<FirstBuild>(&json).unwrap(), first);
-        assert!(in_this_process("no/such.ply", Shown::Mesh, system.as_ref()).is_err());
+        assert!(in_this_process("no/such.ply".as_ref(), Shown::Mesh, system.as_ref()).is_err());
         let error = system_named("nothing").map(drop).unwrap_err();
         assert!(error.to_string().contains("nothing"), "{error}");
     }

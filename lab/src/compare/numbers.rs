@@ -1,5 +1,6 @@
 //! Every number of a comparison, with the machine and the settings.
 
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
@@ -185,7 +186,7 @@ impl Comparison {
     /// # Errors
     /// If a scene cannot be loaded, and those of [`race`].
     pub fn measure(
-        scenes: &[String],
+        scenes: &[OsString],
         systems: &[Box<dyn System>],
         picture: &Picture,
         plan: &Plan,
@@ -193,10 +194,10 @@ impl Comparison {
         let turns = scenes.len() as u64 * systems.len() as u64 * u64::from(plan.repeat);
         let mut progress = Progress::new("starting", turns);
         let scenes = scenes.iter().map(|spec| {
-            progress.set_scope(&display_name(spec));
+            progress.set_scope(&display_name(&spec.to_string_lossy()));
             progress.set_message("preparing");
             SceneNumbers::measure(spec, systems, picture, plan, &mut progress)
-                .with_context(|| format!("cannot compare on `{spec}`"))
+                .with_context(|| format!("cannot compare on `{}`", spec.display()))
         });
         let scenes = scenes.collect::<Result<_>>()?;
         let (size, repeats) = (picture.size, plan.repeat);
@@ -226,7 +227,7 @@ impl Comparison {
 
 impl SceneNumbers {
     fn measure(
-        spec: &str,
+        spec: &OsStr,
         systems: &[Box<dyn System>],
         picture: &Picture,
         plan: &Plan,

@@ -11,6 +11,7 @@
 //! the clock runs, so that no time includes their page faults.
 
 use core::cell::Cell;
+use std::ffi::OsStr;
 
 use anyhow::{Context as _, Result, ensure};
 
@@ -39,7 +40,7 @@ pub struct Plan {
     /// The content of each scene.
     pub shown: Shown,
     /// The function that builds for the first time.
-    pub first: fn(&str, Shown, &dyn System) -> Result<FirstBuild>,
+    pub first: fn(&OsStr, Shown, &dyn System) -> Result<FirstBuild>,
 }
 
 /// Builds and traces with every system.
@@ -157,7 +158,7 @@ mod tests {
             shown: Shown::Mesh,
             first: |_, _, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
         };
-        let first = |system: &dyn System| (plan.first)("", plan.shown, system);
+        let first = |system: &dyn System| (plan.first)("".as_ref(), plan.shown, system);
         race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 

@@ -113,12 +113,15 @@ impl SceneNumbers {
         };
         let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
         let (name, triangles) = (display_name(&self.facts.scene), count(self.facts.triangles));
+        let s = |count: usize| if count == 1 { "" } else { "s" };
+        let of_triangles = s(self.facts.triangles);
         let shown = match self.shown {
-            Shown::Mesh => format!("{triangles} triangles"),
+            Shown::Mesh => format!("{triangles} triangle{of_triangles}"),
             Shown::Instances(instances) => {
-                format!("{} instances of {triangles} triangles", count(instances as usize))
+                let (number, of_instances) = (count(instances as usize), s(instances as usize));
+                format!("{number} instance{of_instances} of {triangles} triangle{of_triangles}")
             }
-            Shown::Spheres => format!("{triangles} spheres"),
+            Shown::Spheres => format!("{triangles} sphere{of_triangles}"),
         };
         format!("{name}: {shown}, hits: {}", hits.join(", "))
     }

@@ -46,7 +46,7 @@ impl Curves {
         let Some(spec) = args.figure1.as_ref().or(args.scenes.first()) else {
             bail!("no scene for figure 1");
         };
-        let scene = Scene::load(spec)?;
+        let (scene, spec) = (Scene::load(spec)?, spec.display());
         ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
         let facts = SceneFacts::of(&scene);
 

@@ -22,6 +22,7 @@ use self::paint::{Seen, paint};
 use self::studio::Studio;
 pub(crate) use self::summary::seconds;
 pub use self::summary::{Summary, Work};
+use crate::cli::Picture as View;
 use crate::cli::render::{RenderArgs, Shading};
 use crate::heat::{self, Counter, Picture};
 use crate::image;
@@ -55,7 +56,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         None => SceneFacts::of(&scene),
         Some(model) => SceneFacts::of_model(&scene.name, model),
     };
-    let none = || format!("no picture of `{}`", args.scene);
+    let none = || format!("no picture of `{}`", args.scene.display());
     ensure!(facts.triangles > 0, "{}: it has no triangles", none());
     ensure!(scene.bounds().is_some(), "{}: no vertex has finite coordinates", none());
 
@@ -70,7 +71,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     };
     let rendered = build(&scene, model.as_ref(), &args.config(), &threads, render);
     let (built, outcome, render_seconds) = rendered.with_context(none)?;
-    ensure!(outcome.hits > 0, "{}: {}", none(), unseen(args, &scene, model.as_ref()));
+    ensure!(outcome.hits > 0, "{}: {}", none(), unseen(&args.picture, &scene, model.as_ref()));
     let Picture { size, pixels } = outcome.picture;
     image::write_png(&args.output, size, &pixels)?;
 
@@ -104,8 +105,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     Ok(())
 }
 
-/// Returns the reason why no ray hits anything, and the remedy.
-fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static str {
+/// Returns the reason why no ray of a picture hits anything, and the remedy.
+pub(crate) fn unseen(picture: &View, scene: &Scene, model: Option<&Model>) -> &'static str {
     let shown = model.into_iter().flat_map(|model| &model.meshes);
     let shown = shown.map(|mesh| (&mesh.positions, &mesh.indices));
     let mut meshes = shown.chain([(&scene.positions, &scene.indices)]);
@@ -121,7 +122,7 @@ fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static s
     if min.iter().chain(&max).any(|c| c.abs() > LARGEST) {
         return "no ray hits anything: its coordinates are larger than 1e30; scale them down";
     }
-    if args.picture.view.is_none() && args.picture.eye.is_none() {
+    if picture.view.is_none() && picture.eye.is_none() {
         return "no ray hits anything: what it shows is smaller than a pixel; take a larger --size, or look from \
                 nearby, by --eye and --target";
     }
@@ -275,13 +276,23 @@ mod tests {
     }
 
     #[test]
+    fn vertices_without_a_triangle_do_not_change_the_picture() {
+        let picture = |text: &str| {
+            let (result, pixels) = run_words("loose", &["--ao", "0"], Some(("a.obj", text)));
+            result.unwrap();
+            pixels.unwrap()
+        };
+        assert!(picture(TRIANGLE) == picture(&format!("{TRIANGLE}v 1e9 1e9 1e9\n")));
+    }
+
+    #[test]
     fn failures_leave_no_picture_and_name_the_cause() {
         let nowhere = "v nan 0 0\nv nan 0 0\nv 0 nan 0\nf 1 2 3\n";
         let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
         let not_finite = "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n";
         let huge = "v 0 0 0\nv 3e38 0 0\nv 0 3e38 0\nf 1 2 3\n";
-        let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\n";
-        let cases: [(&str, &str, &str); 18] = [
+        let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\nf 4 4 4\n";
+        let cases: [(&str, &str, &str); 20] = [
             ("--method fixed --density -1", TRIANGLE, "density"),
             ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),
             ("--no-shadows --shading heat", TRIANGLE, "--no-shadows is for --shading diffuse"),
@@ -291,6 +302,12 @@ mod tests {
             ("--density 8", TRIANGLE, "--density is not for bvh"),
             ("--macrocell-factor 8", TRIANGLE, "--macrocell-factor is for --method fixed"),
             ("--depth 2", TRIANGLE, "--depth is for --method recursive"),
+            (
+                "--method fixed --macrocell-factor 1",
+                TRIANGLE,
+                "--macrocell-factor must be at least 2",
+            ),
+            ("--method recursive --depth 5", TRIANGLE, "--depth must be 1 to 4"),
             ("--method fixed --quality high", TRIANGLE, "--quality is for --method bvh"),
             ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
             ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything; look from elsewhere"),

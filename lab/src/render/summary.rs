@@ -6,6 +6,7 @@ use indicatif::HumanCount;
 use serde::Serialize;
 
 use crate::measure::{SceneFacts, ratio};
+use crate::plural::{counted, triangles};
 
 /// A picture, and the time and work that it took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -65,9 +66,9 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { scene, method, threads, size, samples, .. } = self;
         let (triangles, vertices) =
-            (HumanCount(scene.triangles as u64), HumanCount(scene.vertices as u64));
+            (triangles(scene.triangles), counted(scene.vertices, "vertex", "vertices"));
         let loaded = seconds(self.load_seconds);
-        write!(f, "{}: {triangles} triangles, {vertices} vertices", scene.scene)?;
+        write!(f, "{}: {triangles}, {vertices}", scene.scene)?;
         match self.geometries {
             1 => {}
             geometries => write!(f, " in {geometries} geometries")?,
@@ -85,6 +86,7 @@ impl fmt::Display for Summary {
         write!(f, "{method}: built in {built}, {bytes} bytes, {each:.1} a triangle")?;
         match self.skipped_triangles {
             0 => writeln!(f)?,
+            1 => writeln!(f, "; one triangle that is not finite is left out")?,
             skipped => writeln!(f, "; {skipped} triangles that are not finite are left out")?,
         }
 
@@ -99,8 +101,8 @@ impl fmt::Display for Summary {
             (false, 0) => {}
             (false, _) => f.write_str(", ambient occlusion")?,
         }
-        let (rays, rendered) = (HumanCount(self.rays), seconds(self.render_seconds));
-        write!(f, "; {rays} rays in {rendered} on {threads} thread{s}")?;
+        let (rays, rendered) = (counted(self.rays, "ray", "rays"), seconds(self.render_seconds));
+        write!(f, "; {rays} in {rendered} on {threads} thread{s}")?;
         if let Some(Work {
             primitive_tests_per_ray: tests,
             cell_steps_per_ray: cells,

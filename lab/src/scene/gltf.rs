@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use base64::Engine as _;
-use gltf::accessor::{DataType, Dimensions};
+use gltf::accessor::{DataType, Dimensions, Item, Iter};
 use gltf::buffer::{Source, View};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Primitive, Semantic};
@@ -29,6 +29,9 @@ const LOOKS: [&str; 6] = [
     "EXT_lights_",
     "MSFT_texture_",
 ];
+
+/// The extension of positions that are whole numbers of 8 or 16 bits.
+const QUANTIZED: &str = "KHR_mesh_quantization";
 
 /// Reads the bytes of a file, and the files that it names beside it.
 ///
@@ -69,7 +72,8 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
-/// Parses and checks a file. Extensions that change how surfaces look are allowed even if the file requires them.
+/// Parses and checks a file. [`QUANTIZED`] and extensions that change how surfaces look are allowed even if the file
+/// requires them.
 fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     let cannot = "it is not a valid glTF file";
     // Bytes 8 to 11 of a binary file are its length.
@@ -81,7 +85,9 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     }
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).context(cannot)?;
     let mut root = document.into_json();
-    root.extensions_required.retain(|name| !LOOKS.iter().any(|start| name.starts_with(start)));
+    let is_read =
+        |name: &String| name == QUANTIZED || LOOKS.iter().any(|start| name.starts_with(start));
+    root.extensions_required.retain(|name| !is_read(name));
     if let Some(name) = root.extensions_required.first() {
         bail!(
             "it requires the extension {name}, which hgrid does not read: export it without that"
@@ -141,14 +147,10 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
     if accessor.count() == 0 {
         return Ok(Some(Mesh::default()));
     }
-    ensure!(
-        (accessor.data_type(), accessor.dimensions()) == (DataType::F32, Dimensions::Vec3),
-        "its positions are not three floats each"
-    );
-    let outside = "its positions are outside their buffer";
-    ensure!(is_inside(&accessor, buffers), outside);
+    ensure!(accessor.dimensions() == Dimensions::Vec3, "its positions are not three numbers each");
+    ensure!(is_inside(&accessor, buffers), "its positions are outside their buffer");
     let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|bytes| &**bytes));
-    let positions: Vec<_> = reader.read_positions().context(outside)?.collect();
+    let positions = positions(&accessor, buffers)?;
     let corners: Vec<u32> = match primitive.indices() {
         None => (0..u32::try_from(positions.len())?).collect(),
         Some(indices) => {
@@ -207,6 +209,37 @@ fn is_inside(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> bool {
             holds(indices.view(), indices.offset(), count, indices.index_type().size())
                 && holds(values.view(), values.offset(), count, size)
         })
+}
+
+/// Reads positions: floats or, as `KHR_mesh_quantization` has them, small whole numbers, which stand for parts of the
+/// largest one if they are normalized.
+fn positions(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<Vec<[f32; 3]>> {
+    let largest = |most: f32| if accessor.normalized() { most } else { 1.0 };
+    let positions = match accessor.data_type() {
+        DataType::F32 => numbers::<f32>(accessor, buffers, 1.0),
+        DataType::I8 => numbers::<i8>(accessor, buffers, largest(127.0)),
+        DataType::U8 => numbers::<u8>(accessor, buffers, largest(255.0)),
+        DataType::I16 => numbers::<i16>(accessor, buffers, largest(32_767.0)),
+        DataType::U16 => numbers::<u16>(accessor, buffers, largest(65_535.0)),
+        DataType::U32 => bail!("its positions are neither floats nor of 8 or 16 bits"),
+    };
+    positions.context("its positions are outside their buffer")
+}
+
+/// Reads positions of one type as parts of the largest number. The least one of a signed type would be less than -1,
+/// and means -1.
+fn numbers<T: Item + Copy + Into<f32>>(
+    accessor: &Accessor<'_>,
+    buffers: &[Vec<u8>],
+    largest: f32,
+) -> Option<Vec<[f32; 3]>> {
+    let bytes = |buffer: gltf::Buffer<'_>| buffers.get(buffer.index()).map(|bytes| &**bytes);
+    let points = Iter::<[T; 3]>::new(accessor.clone(), bytes)?;
+    let part = |number: T| {
+        let part = number.into() / largest;
+        if largest > 1.0 { part.max(-1.0) } else { part }
+    };
+    Some(points.map(|point| point.map(part)).collect())
 }
 
 /// Walks the nodes of the default scene, or of the first one; without scenes, all nodes.
@@ -393,6 +426,51 @@ mod tests {
         let texture = r#""textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}], "#;
         let text = as_text().replacen(r#""asset""#, &[texture, names].concat(), 1);
         assert_eq!(read_text(&text).unwrap(), read_text(&as_text()).unwrap());
+    }
+
+    #[test]
+    fn whole_numbers_are_positions() {
+        let quantized = |bytes: &[u8], kind: &str, stride: usize| {
+            let data = BASE64_STANDARD.encode(bytes);
+            read_text(&format!(
+                r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["KHR_mesh_quantization"],
+                "extensionsUsed": ["KHR_mesh_quantization"],
+                "nodes": [{{"mesh": 0, "scale": [2, 2, 2], "translation": [1, 0, 0]}}],
+                "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+                "buffers": [{{"byteLength": {0}, "uri": "data:;base64,{data}"}}],
+                "bufferViews": [{{"buffer": 0, "byteLength": {0}, "byteStride": {stride}}}],
+                "accessors": [{{"bufferView": 0, "componentType": {kind}, "type": "VEC3", "count": 3,
+                    "min": [0, 0, 0], "max": [1, 1, 1]}}]}}"#,
+                bytes.len()
+            ))
+        };
+        let small = [0, 0, 0, 0, 127, 0, 0, 0, 0, 255, 128, 0];
+        let wide = [-32_768, 0, 0, 0, 32_767, 0, 0, 0, 0, -300, 0, 0];
+        let wide: Vec<u8> = wide.into_iter().flat_map(i16::to_le_bytes).collect();
+        let normalized = |kind: &str| format!(r#"{kind}, "normalized": true"#);
+        for (kind, [x, y, z]) in [
+            ("5120".to_owned(), [127.0, -1.0, -128.0]),
+            (normalized("5120"), [1.0, -1.0 / 127.0, -1.0]),
+            ("5121".to_owned(), [127.0, 255.0, 128.0]),
+            (normalized("5121"), [127.0 / 255.0, 1.0, 128.0 / 255.0]),
+        ] {
+            let model = quantized(&small, &kind, 4).unwrap();
+            assert_eq!(model.meshes[0].positions, [[0.0; 3], [x, 0.0, 0.0], [0.0, y, z]], "{kind}");
+            let moved = [[1.0, 0.0, 0.0], [2.0 * x + 1.0, 0.0, 0.0], [1.0, 2.0 * y, 2.0 * z]];
+            assert_eq!(model.flatten().unwrap().positions, moved, "{kind}");
+        }
+        for (kind, [x, y, z]) in [
+            ("5122".to_owned(), [-32_768.0, 32_767.0, -300.0]),
+            (normalized("5122"), [-1.0, 1.0, -300.0 / 32_767.0]),
+            ("5123".to_owned(), [32_768.0, 32_767.0, 65_236.0]),
+            (normalized("5123"), [32_768.0 / 65_535.0, 32_767.0 / 65_535.0, 65_236.0 / 65_535.0]),
+        ] {
+            let model = quantized(&wide, &kind, 8).unwrap();
+            let expected = [[x, 0.0, 0.0], [y, 0.0, 0.0], [0.0, z, 0.0]];
+            assert_eq!(model.meshes[0].positions, expected, "{kind}");
+        }
+        let message = format!("{:#}", quantized(&wide, "5125", 12).unwrap_err());
+        assert!(message.contains("neither floats nor of 8 or 16 bits"), "{message}");
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod ply;
 pub mod procedural;
 mod stl;
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
@@ -39,6 +40,8 @@ pub struct Scene {
     pub geometries: Vec<usize>,
     /// The part that pictures show, if not all of it.
     pub focus: Option<Bounds>,
+    /// The box around the triangles of a file, which may have vertices elsewhere.
+    pub of_triangles: Option<Bounds>,
     /// The axis that the file's format says is up, if it does: true for z, false for y.
     pub is_z_up: Option<bool>,
 }
@@ -56,8 +59,8 @@ impl Scene {
     /// assert_eq!(scene.indices.len(), 2000);
     /// # Ok::<(), anyhow::Error>(())
     /// ```
-    pub fn load(spec: &str) -> Result<Self> {
-        Self::open(spec, false).map(|(scene, _)| scene)
+    pub fn load(spec: impl AsRef<OsStr>) -> Result<Self> {
+        Self::open(spec.as_ref(), false).map(|(scene, _)| scene)
     }
 
     /// Loads a scene. If the caller takes instances, and the file shows a mesh more than once, the instances
@@ -66,12 +69,14 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`load`](Self::load).
-    pub fn open(spec: &str, takes_instances: bool) -> Result<(Self, Option<Model>)> {
+    pub fn open(spec: &OsStr, takes_instances: bool) -> Result<(Self, Option<Model>)> {
         let path = Path::new(spec);
-        if let Some((inner, outer)) = spec.split_once('+').filter(|_| !path.exists()) {
+        // A name that is no text is that of one file.
+        let (text, spec) = (spec.to_str().unwrap_or_default(), spec.display());
+        if let Some((inner, outer)) = text.split_once('+').filter(|_| !path.exists()) {
             return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
         }
-        if let Some(words) = spec.strip_prefix("procedural:") {
+        if let Some(words) = text.strip_prefix("procedural:") {
             let scene = procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
             return Ok((scene, None));
         }
@@ -90,9 +95,10 @@ impl Scene {
             return Ok((Self { positions, ..scene }, Some(model)));
         }
         let mesh = model.flatten();
-        let Mesh { positions, indices } =
-            mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
-        Ok((Self { positions, indices, ..scene }, None))
+        let mesh = mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
+        let of_triangles = mesh.bounds();
+        let Mesh { positions, indices } = mesh;
+        Ok((Self { positions, indices, of_triangles, ..scene }, None))
     }
 
     /// Puts this scene in the middle of another, both at their own sizes; pictures show this one.
@@ -123,7 +129,8 @@ impl Scene {
         let behind = behind.map(|triangle| triangle.map(|v| vertex(v, others, shift)));
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
         let indices = inside.chain(behind).collect();
-        Self { name, positions, indices, geometries, focus, is_z_up: self.is_z_up }
+        let is_z_up = self.is_z_up;
+        Self { name, positions, indices, geometries, focus, of_triangles: None, is_z_up }
     }
 
     /// Returns the first triangle of each geometry, or 0 for a scene of one.
@@ -165,7 +172,7 @@ impl Scene {
     /// Returns the box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
     #[must_use]
     pub fn framed_bounds(&self) -> Bounds {
-        self.focus.or_else(|| self.bounds()).unwrap_or_default()
+        self.focus.or(self.of_triangles).or_else(|| self.bounds()).unwrap_or_default()
     }
 }
 
@@ -209,7 +216,7 @@ mod tests {
         for triangle in 0..5000 {
             assert_eq!(joined.triangle(triangle), merged.triangle(triangle));
         }
-        let three = Scene::load(&format!("{spec}+procedural:soup:500")).unwrap();
+        let three = Scene::load(format!("{spec}+procedural:soup:500")).unwrap();
         assert_eq!(three.geometries, [0, 2000, 5000]);
         assert!(small.parts().unwrap().is_empty());
         let bad = Scene { indices: vec![[0, 1, 999_999]], ..small.clone() };

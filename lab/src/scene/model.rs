@@ -27,6 +27,36 @@ pub struct Mesh {
     pub indices: Vec<[u32; 3]>,
 }
 
+impl Mesh {
+    /// Returns the box around all finite triangles, or `None` if there are none. Vertices without a triangle may lie
+    /// anywhere.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Bounds> {
+        bounds(self.vertices(&self.is_used()))
+    }
+
+    /// Tells of each vertex whether a finite triangle uses it.
+    fn is_used(&self) -> Vec<bool> {
+        let is_finite = |&vertex: &u32| {
+            let position = self.positions.get(vertex as usize);
+            position.is_some_and(|position| position.iter().all(|c| c.is_finite()))
+        };
+        let mut is_used = vec![false; self.positions.len()];
+        for triangle in self.indices.iter().filter(|triangle| triangle.iter().all(is_finite)) {
+            for &vertex in triangle {
+                is_used[vertex as usize] = true;
+            }
+        }
+        is_used
+    }
+
+    /// Returns the vertices that are used.
+    fn vertices<'a>(&'a self, is_used: &'a [bool]) -> impl Iterator<Item = [f32; 3]> + 'a {
+        let used = self.positions.iter().zip(is_used).filter(|(_, is_used)| **is_used);
+        used.map(|(&position, _)| position)
+    }
+}
+
 /// Meshes with their instances.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Model {
@@ -55,12 +85,13 @@ impl Model {
             && have_inverses(shown.map(|&(_, transform)| transform))
     }
 
-    /// Returns the box around all finite vertices of all instances, or `None` if there are none.
+    /// Returns the box around all finite triangles of all instances, or `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
+        let is_used: Vec<_> = self.meshes.iter().map(Mesh::is_used).collect();
         let of = |&(mesh, transform): &(usize, Transform)| {
-            let positions = &self.meshes.get(mesh)?.positions;
-            bounds(positions.iter().map(|&position| moved(&transform, position)))
+            let vertices = self.meshes.get(mesh)?.vertices(is_used.get(mesh)?);
+            bounds(vertices.map(|position| moved(&transform, position)))
         };
         let corners = self.instances.iter().filter_map(of).flat_map(|(min, max)| [min, max]);
         bounds(corners)
@@ -172,8 +203,14 @@ mod tests {
     #[test]
     fn meshes_are_shared_that_stand_twice_where_instances_can() {
         let mesh = Mesh {
-            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, f32::NAN], [0.0, 1.0, 0.0]],
-            indices: vec![[0, 1, 3]],
+            positions: vec![
+                [0.0; 3],
+                [1.0, 0.0, 0.0],
+                [9.0, 1.0, 7.0],
+                [0.0, 1.0, 0.0],
+                [f32::NAN; 3],
+            ],
+            indices: vec![[0, 1, 3], [2, 1, 4]],
         };
         let of = |instances: &[(usize, Transform)]| Model {
             meshes: vec![mesh.clone(), mesh.clone(), Mesh::default()],
@@ -197,6 +234,16 @@ mod tests {
         let model = of(&[(0, IDENTITY), (0, beside), (7, beside)]);
         assert_eq!(model.bounds(), Some(([0.0; 3], [6.0, 1.0, 2.0])));
         assert_eq!(Model::default().bounds(), None);
+    }
+
+    #[test]
+    fn a_box_leaves_out_vertices_without_a_finite_triangle() {
+        let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN, 0.0, 0.0]];
+        positions.extend([[1e6; 3], [-9.0; 3]]);
+        let mesh = Mesh { positions, indices: vec![[0, 1, 2], [3, 4, 5], [4, 5, 6]] };
+        assert_eq!(mesh.bounds(), Some(([0.0; 3], [1.0, 1.0, 0.0])));
+        let points = Mesh { indices: Vec::new(), ..mesh };
+        assert_eq!(points.bounds(), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::Mesh;
+use crate::plural::triangles;
 
 /// Bytes before the first triangle of a binary file: a comment and the triangle count.
 const HEADER_BYTES: usize = 84;
@@ -30,7 +31,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
             let present = rest.len() / TRIANGLE_BYTES;
             ensure!(
                 count <= present,
-                "it is cut off after {present} of {count} triangles, or it is not an STL file"
+                "it is cut off after {present} of {}, or it is not an STL file",
+                triangles(count)
             );
             Ok(binary(&rest[..count * TRIANGLE_BYTES]))
         }
