@@ -469,7 +469,7 @@ mod tests {
             let expected = [[x, 0.0, 0.0], [y, 0.0, 0.0], [0.0, z, 0.0]];
             assert_eq!(model.meshes[0].positions, expected, "{kind}");
         }
-        let message = format!("{:#}", quantized(&wide, "5125", 12).unwrap_err());
+        let message = format!("{:#}", quantized(&[0; 36], "5125", 12).unwrap_err());
         assert!(message.contains("neither floats nor of 8 or 16 bits"), "{message}");
     }
 
