@@ -7,7 +7,8 @@
 //! for each range of more than a leaf, breadth first:
 //!     cut it in eight where neighbours differ in the highest bits; halve what has equal keys
 //!     parts of a leaf's size or less become leaves, the others nodes
-//! for each node, the last one first: unite the boxes of each leaf, quantise all eight
+//! for each node, last first: the box of a child is the union of its triangles' boxes, or its node's box;
+//!                            quantise all eight
 //! ```
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
@@ -62,7 +63,7 @@ pub(crate) struct Subtree {
 /// The rule by which ranges are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
-    /// Cuts where the highest bit changes in which keys differ.
+    /// Cuts between neighbours whose keys differ in the highest bits.
     Keys,
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
     Halves,
@@ -85,9 +86,9 @@ impl EntryRange {
     }
 }
 
-/// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids lie in the index from `first`
-/// on, the nodes below the root from `child` on. No step of a node is smaller than that of a box of size
-/// `least`. Where cuts by keys make more nodes than the layout has room for, ranges are halved.
+/// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids lie in the index from `first` on, the nodes
+/// below the root from `child` on. `least` is [`least_node`](super::build::least_node) of the scene. Where cuts by keys
+/// make more nodes than the layout has room for, ranges are halved.
 pub(crate) struct Build<'w> {
     pub(crate) subtree: &'w mut Subtree,
     pub(crate) mesh: &'w TriangleMesh<'w>,
@@ -201,17 +202,17 @@ impl Subtree {
         }
         let [low, high]: [[u8; 64]; 2] = transmute!(self.changes);
         let [low, high] = [u8x64::simd_from(simd, low), u8x64::simd_from(simd, high)];
-        let changes = |level: u8| {
-            let level = u8x64::splat(simd, level);
-            let [low, high] = [low.simd_eq(level).to_bitmask(), high.simd_eq(level).to_bitmask()];
+        let changes = |bit: u8| {
+            let bit = u8x64::splat(simd, bit);
+            let [low, high] = [low.simd_eq(bit).to_bitmask(), high.simd_eq(bit).to_bitmask()];
             u128::from(low) | u128::from(high) << 64
         };
-        // The levels that occur, as bits.
-        let levels = self.changes.iter().fold(0_u32, |levels, &level| levels | 1 << (level % 32));
+        // The numbers that occur in `changes`, as a mask.
+        let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32));
         (self.count, self.id_count) = (1, 0);
         let mut at = 0;
         while at < self.count {
-            self.cut(at, levels & !1, changes);
+            self.cut(at, bits & !1, changes);
             at += 1;
         }
     }
@@ -219,12 +220,12 @@ impl Subtree {
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
     /// each other.
     #[inline(always)]
-    fn cut(&mut self, at: usize, levels: u32, changes: impl Fn(u8) -> u128) {
+    fn cut(&mut self, at: usize, bits: u32, changes: impl Fn(u8) -> u128) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
             return;
         };
-        let parts = parts(range, levels, changes);
+        let parts = parts(range, bits, changes);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate() {
@@ -315,14 +316,14 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     [x, y, z, 0.0, u, v, w, 0.0]
 }
 
-/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
-/// keys change in the highest bits, and in the middle of what is left.
+/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where keys
+/// change in the highest bits; then the largest part is halved until there are eight.
 #[inline(always)]
-fn parts(range: EntryRange, levels: u32, changes: impl Fn(u8) -> u128) -> [EntryRange; WIDTH] {
+fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> [EntryRange; WIDTH] {
     let mut parts = [EntryRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
-    let mut cuts = highest(range, levels, changes);
+    let mut cuts = highest(range, bits, changes);
     while cuts != 0 && count < WIDTH - 1 {
         let end = cuts.trailing_zeros() as u8 + 1;
         cuts &= cuts - 1;
@@ -357,15 +358,15 @@ fn parts(range: EntryRange, levels: u32, changes: impl Fn(u8) -> u128) -> [Entry
 
 /// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer.
 #[inline(always)]
-fn highest(range: EntryRange, levels: u32, changes: impl Fn(u8) -> u128) -> u128 {
+fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> u128 {
     // A range of one entry or none has no inside.
     let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else { return 0 };
     let inside = (1_u128 << last) - (1 << range.start);
     let (mut chosen, mut left) = (0, WIDTH as u32 - 1);
-    let mut levels = levels;
-    while let Some(level) = levels.checked_ilog2() {
-        levels ^= 1 << level;
-        let mut here = changes(level as u8) & inside;
+    let mut bits = bits;
+    while let Some(bit) = bits.checked_ilog2() {
+        bits ^= 1 << bit;
+        let mut here = changes(bit as u8) & inside;
         if here.count_ones() >= left {
             for _ in 0..left {
                 chosen |= here & here.wrapping_neg();

@@ -6,14 +6,16 @@
 //!     a tree:             move each of them into its space, as a single query does
 //!                         take them through it together, each up to its closest hit so far
 //!                         move the `t` of what they hit back, and end them there
-//!     all else, or a few: ask it for each of them alone
+//!     other objects, or few rays: ask it for each of them alone
 //! ```
 
 use core::marker::PhantomData;
 
 use super::batch::{SceneAnswer, alone};
-use super::instance::{Seen, StoredInstance};
-use super::query::{InstanceSearch, Question, SceneHit, SceneOptions, ask_object, outward};
+use super::instance::{ObjectRay, StoredInstance};
+use super::query::{
+    InstanceSearch, QueryParameters, SceneHit, SceneOptions, ask_object, scene_hit,
+};
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::batch::groups::in_groups;
@@ -37,7 +39,7 @@ pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
     options: &mut SceneOptions<'_>,
 ) {
     let lent = core::mem::take(&mut options.scratch);
-    let rays = &mut SceneRays::new(scene, Question::new(options, A::IS_ANY));
+    let rays = &mut SceneRays::new(scene, QueryParameters::new(options, A::IS_ANY));
     // All instances: `shown` leaves out those that the mask does not see.
     let asked = (QueryOptions::default().choice(), false);
     let batch = &mut SceneBatch { scene, batch, options, answers: PhantomData::<A>, rays };
@@ -85,13 +87,13 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for SceneBatch<'_, '_, '_, B,
 /// The rays of a group in a scene and their closest hits. Not generic over the batch: all batches share its code.
 struct SceneRays<'r> {
     scene: &'r Scene<'r>,
-    question: Question,
+    parameters: QueryParameters,
     given: [RayF64; GROUP],
     /// The largest coordinate of an origin that was rounded, or 0.
     largest: f32,
     best: [SceneHit; GROUP],
     /// The rays that enter an object, as it sees them, and their lanes in the group.
-    seen: [Seen; GROUP],
+    object_rays: [ObjectRay; GROUP],
     lanes: [u32; GROUP],
     /// The `t` up to which hits of each matter.
     until: [f32; GROUP],
@@ -100,16 +102,16 @@ struct SceneRays<'r> {
 }
 
 impl<'r> SceneRays<'r> {
-    fn new(scene: &'r Scene<'r>, question: Question) -> Self {
-        let mut inside = Rays::new(question.options().choice());
+    fn new(scene: &'r Scene<'r>, parameters: QueryParameters) -> Self {
+        let mut inside = Rays::new(parameters.options().choice());
         inside.starts_at_box = true;
         Self {
             scene,
-            question,
+            parameters,
             given: [RayF64::new([0.0; 3], [0.0; 3]); GROUP],
             largest: 0.0,
             best: [SceneHit::MISS; GROUP],
-            seen: [Seen::NONE; GROUP],
+            object_rays: [ObjectRay::NONE; GROUP],
             lanes: [0; GROUP],
             until: [0.0; GROUP],
             inside,
@@ -135,13 +137,13 @@ impl<'r> SceneRays<'r> {
     fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel) -> u64 {
         self.best = [SceneHit::MISS; GROUP];
         group.rays.origin_error = self.largest * f32::EPSILON;
-        let is_any = self.question.is_any;
+        let is_any = self.parameters.is_any;
         group.offer(level, is_any, &mut |number, mask, outer| self.offer(number, mask, outer))
     }
 
     /// Asks an instance for some rays.
     fn offer(&mut self, number: u32, mask: u64, outer: &mut Rays) {
-        let Some((placed, object)) = self.scene.shown(number, &self.question) else { return };
+        let Some((placed, object)) = self.scene.shown(number, &self.parameters) else { return };
         let grid = match object {
             Object::Grid(grid) => Some(*grid),
             Object::Shapes(shapes, _) => Some(shapes.grid()),
@@ -162,14 +164,14 @@ impl<'r> SceneRays<'r> {
     /// Asks an instance for one ray.
     #[inline(never)]
     fn alone(&mut self, number: u32, lane: u32, outer: &mut Rays) {
-        let (at, question) = (lane as usize % GROUP, self.question);
+        let (at, parameters) = (lane as usize % GROUP, self.parameters);
         let ray = &self.given[at];
         let mut search = InstanceSearch {
             scene: self.scene,
             line: &ray.into(),
             ray,
             level: 0,
-            question: &question,
+            parameters: &parameters,
             best: None,
             limit: self.best[at].t,
             filter: None,
@@ -195,25 +197,27 @@ impl<'r> SceneRays<'r> {
         let mut count = 0;
         for lane in lanes(mask) {
             let ray = &self.given[lane as usize % GROUP];
-            let Some(mut seen) = Seen::new(&placed.line(&LineF64::from(ray))) else { continue };
+            let Some(mut object_ray) = ObjectRay::new(&placed.line(&LineF64::from(ray))) else {
+                continue;
+            };
             let limit = self.best[lane as usize % GROUP].t;
-            let Some(inside) = seen.narrow(ray, &corners) else { continue };
+            let Some(inside) = object_ray.narrow(ray, &corners) else { continue };
             // A group takes no hits behind the origin.
-            if seen.is_from_afar(&corners) {
+            if object_ray.is_from_afar(&corners) {
                 self.alone(number, lane, outer);
                 continue;
             }
-            self.until[count % GROUP] = seen.until(limit, &inside);
+            self.until[count % GROUP] = object_ray.until(limit, &inside);
             self.inside.slots()[count % GROUP] = inside;
-            self.seen[count % GROUP] = seen;
+            self.object_rays[count % GROUP] = object_ray;
             self.lanes[count % GROUP] = lane;
             count += 1;
         }
         if count == 0 {
             return;
         }
-        let is_any = self.question.is_any;
-        let options = &mut self.question.options();
+        let is_any = self.parameters.is_any;
+        let options = &mut self.parameters.options();
         let (rays, stack) = (&mut self.inside, &mut self.stack);
         let until = Some(&self.until);
         let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count, until };
@@ -234,7 +238,7 @@ impl<'r> SceneRays<'r> {
             let Some(hit) = hit else { continue };
             let lane = self.lanes[at];
             let ray = &self.given[lane as usize % GROUP];
-            self.keep(lane, &outward(&self.seen[at], ray, 0, number, &hit), outer);
+            self.keep(lane, &scene_hit(&self.object_rays[at], ray, 0, number, &hit), outer);
         }
     }
 
@@ -245,7 +249,7 @@ impl<'r> SceneRays<'r> {
             return;
         }
         *best = *hit;
-        if self.question.is_any {
+        if self.parameters.is_any {
             outer.finish(lane);
         } else {
             outer.end_at(lane, hit.t);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! caller  scene = linear * object + translation         9 x f32, 3 x f64
-//! blob    object = inverse * (scene - translation)      the same struct, with the inverse as its nine
+//! blob    object = inverse * (scene - translation)      the same struct, with the inverse in `linear`
 //! ```
 //!
 //! Origins and directions are moved in f64, through all scenes on the way, and rounded to f32 once, for the
@@ -12,13 +12,14 @@
 //!
 //! ```text
 //! t of the object's ray = t * scale - shift
-//! shift   0; for an origin more than four extents away from the object the place where the ray enters its box
+//! shift   0; for an origin more than four extents away from the object the distance at which the ray
+//!         enters its box
 //! ```
 //!
-//! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
-//! that ray, the instances on the path and the object's box alone: so every query asks the object the same. The
-//! closest hit so far only shortens the walk ([`Seen::until`]). Only the test of a shape gets the range that is left,
-//! because it compares its own `t` with it.
+//! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of that
+//! ray, the instances on the path and the object's box alone: so every query asks the object the same. The closest hit
+//! so far only shortens the walk ([`ObjectRay::until`]). Only the test of a shape gets the range that is left, because
+//! it compares its own `t` with it.
 
 use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -197,7 +198,7 @@ fn inverse_of([a, b, c]: &Matrix) -> Option<Matrix> {
 
 /// A ray as an object sees it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct ObjectRay {
     /// The ray's line, its direction scaled: the largest component lies between 1 and 2.
     pub(super) line: LineF64,
     /// `t` of this ray = `t` of the scene's ray * scale - shift.
@@ -205,11 +206,10 @@ pub(super) struct Seen {
     shift: f64,
 }
 
-/// The rounding of f64 moves the origin of a ray by 2^-23 of an extent if it comes from so many extents away. At 2^-19
-/// it passes the growth of the box ([`GROWTH`]); the rest is a margin.
+/// From 2^29 extents away, f64 rounding moves an origin by 2^-23 extent; [`GROWTH`] covers 2^-19, the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
 
-impl Seen {
+impl ObjectRay {
     /// No ray: fills the places of a group.
     pub(super) const NONE: Self = {
         let line = LineF64 { origin: [0.0; 3], direction: [0.0; 3] };
@@ -245,9 +245,9 @@ impl Seen {
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
         Some(Ray {
             origin: [at(0), at(1), at(2)],
-            t_min: self.inward(ray.t_min),
+            t_min: self.object_t(ray.t_min),
             direction: direction.map(round),
-            t_max: self.inward(ray.t_max),
+            t_max: self.object_t(ray.t_max),
         })
     }
 
@@ -278,7 +278,7 @@ impl Seen {
     }
 
     /// The `t` of the object's ray.
-    fn inward(&self, t: f32) -> f32 {
+    fn object_t(&self, t: f32) -> f32 {
         round(f64::from(t) * self.scale - self.shift)
     }
 
@@ -294,7 +294,7 @@ impl Seen {
     }
 
     /// The `t` of the scene's ray, which lies in that ray's range.
-    pub(super) fn outward(&self, t: f32, ray: &RayF64) -> f32 {
+    pub(super) fn scene_t(&self, t: f32, ray: &RayF64) -> f32 {
         let t = round((f64::from(t) + self.shift) / self.scale);
         lesser(greater(t, ray.t_min), ray.t_max)
     }

@@ -1,7 +1,7 @@
 //! The queries of a scene: closest hit and any hit of a ray.
 //!
 //! ```text
-//! walk the tree of the scene; for each instance whose box the ray meets, about from near to far:
+//! walk the tree of the scene; for each instance whose box the ray meets, roughly front to back:
 //!     drop it by its mask
 //!     move the ray into the space of its object, in f64
 //!     a grid or shapes:   round the ray to f32, ask the object up to the closest hit so far,
@@ -13,7 +13,7 @@ use core::fmt;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-use super::instance::{Seen, StoredInstance};
+use super::instance::{ObjectRay, StoredInstance};
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::counters::Counters;
@@ -70,7 +70,7 @@ pub struct SceneOptions<'q> {
     /// instance that mirrors does not turn it round.
     pub cull: Cull,
     /// Decides whether a hit counts. Within an instance it is asked from near to far and about each triangle at most
-    /// once; instances come about from near to far, so a hit that it accepts may still be replaced by a closer one of
+    /// once; instances come roughly front to back, so a hit that it accepts may still be replaced by a closer one of
     /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it:
     /// their test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
@@ -151,7 +151,7 @@ impl Scene<'_> {
         options: &mut SceneOptions<'_>,
         is_any: bool,
     ) -> Option<SceneHit> {
-        let question = Question::new(options, is_any);
+        let parameters = QueryParameters::new(options, is_any);
         let counters = options.counters.as_deref_mut();
         let mut show;
         let filter: Option<&mut HitFilter<'_>> = match &mut options.filter {
@@ -161,16 +161,16 @@ impl Scene<'_> {
             }
             None => None,
         };
-        self.trace(&LineF64::from(ray), ray, f32::INFINITY, 0, &question, filter, counters)
+        self.trace(&LineF64::from(ray), ray, f32::INFINITY, 0, &parameters, filter, counters)
     }
 
     /// An instance that a query sees, and its object.
     pub(super) fn shown(
         &self,
         number: u32,
-        question: &Question,
+        parameters: &QueryParameters,
     ) -> Option<(&StoredInstance, &Object<'_>)> {
-        let mask = question.mask;
+        let mask = parameters.mask;
         if mask != u32::MAX && self.tree.mesh().mask(number) & mask == 0 {
             return None;
         }
@@ -187,7 +187,7 @@ impl Scene<'_> {
         ray: &RayF64,
         limit: f32,
         level: usize,
-        question: &Question,
+        parameters: &QueryParameters,
         filter: Option<&mut HitFilter<'_>>,
         counters: Option<&mut Counters>,
     ) -> Option<SceneHit> {
@@ -200,7 +200,7 @@ impl Scene<'_> {
             line,
             ray,
             level,
-            question,
+            parameters,
             best: None,
             limit,
             filter,
@@ -212,7 +212,7 @@ impl Scene<'_> {
             let cut = RayF64 { t_max, ..*ray };
             self.tree.search_boxes(&cut, &mut offer, &mut steps);
         } else {
-            let Seen { line, scale, .. } = Seen::new(line)?;
+            let ObjectRay { line, scale, .. } = ObjectRay::new(line)?;
             let range = [ray.t_min, t_max];
             self.tree.search_boxes_along(&line, scale, range, &mut offer, &mut steps);
         }
@@ -225,13 +225,13 @@ impl Scene<'_> {
 
 /// The conditions that hold for all instances.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Question {
+pub(super) struct QueryParameters {
     mask: u32,
     cull: Cull,
     pub(super) is_any: bool,
 }
 
-impl Question {
+impl QueryParameters {
     pub(super) const fn new(options: &SceneOptions<'_>, is_any: bool) -> Self {
         Self { mask: options.mask, cull: options.cull, is_any }
     }
@@ -251,7 +251,7 @@ pub(super) struct InstanceSearch<'q, 'f> {
     pub(super) line: &'q LineF64,
     pub(super) ray: &'q RayF64,
     pub(super) level: usize,
-    pub(super) question: &'q Question,
+    pub(super) parameters: &'q QueryParameters,
     pub(super) best: Option<SceneHit>,
     /// Nothing farther matters.
     pub(super) limit: f32,
@@ -267,19 +267,19 @@ impl InstanceSearch<'_, '_> {
             return Outcome::Unchanged;
         }
         (self.best, self.limit) = (Some(hit), hit.t);
-        if self.question.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
+        if self.parameters.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
 
     /// Finds the ray's hit in an instance, no farther than what was hit before.
     pub(super) fn ask(&mut self, number: u32) -> Option<SceneHit> {
-        let Self { scene, line, ray, level, question, .. } = *self;
-        let is_any = question.is_any;
-        let (placed, object) = scene.shown(number, question)?;
+        let Self { scene, line, ray, level, parameters, .. } = *self;
+        let is_any = parameters.is_any;
+        let (placed, object) = scene.shown(number, parameters)?;
         let line = placed.line(line);
 
         // Inside a scene the ray keeps its f64 and its `t`.
         if let Object::Scene(inner) = object {
-            let outward = |hit: &SceneHit| {
+            let named = |hit: &SceneHit| {
                 let mut hit = *hit;
                 if let Some(place) = hit.path.get_mut(level) {
                     *place = number;
@@ -289,34 +289,34 @@ impl InstanceSearch<'_, '_> {
             let mut show;
             let filter: Option<&mut HitFilter<'_>> = match &mut self.filter {
                 Some(filter) => {
-                    show = |hit: &SceneHit| filter(&outward(hit));
+                    show = |hit: &SceneHit| filter(&named(hit));
                     Some(&mut show)
                 }
                 None => None,
             };
             let (limit, counters) = (self.limit, self.counters.as_deref_mut());
-            let hit = inner.trace(&line, ray, limit, level + 1, question, filter, counters)?;
-            return Some(outward(&hit));
+            let hit = inner.trace(&line, ray, limit, level + 1, parameters, filter, counters)?;
+            return Some(named(&hit));
         }
 
-        let mut seen = Seen::new(&line)?;
-        let inside = seen.narrow(ray, &object.bounds())?;
-        let until = seen.until(self.limit, &inside);
-        let outward = |hit: &Hit| outward(&seen, ray, level, number, hit);
+        let mut object_ray = ObjectRay::new(&line)?;
+        let inside = object_ray.narrow(ray, &object.bounds())?;
+        let until = object_ray.until(self.limit, &inside);
+        let to_scene = |hit: &Hit| scene_hit(&object_ray, ray, level, number, hit);
         let mut show;
-        let mut options = question.options();
+        let mut options = parameters.options();
         options.counters = self.counters.as_deref_mut();
         if let (Object::Grid(_), Some(filter)) = (object, &mut self.filter) {
-            show = |_: usize, hit: &Hit| filter(&outward(hit));
+            show = |_: usize, hit: &Hit| filter(&to_scene(hit));
             options.filter = Some(&mut show);
         }
         let hit = ask_object(object, &inside, until, is_any, &mut options)?;
-        Some(outward(&hit))
+        Some(to_scene(&hit))
     }
 }
 
 /// Returns the closest hit of a ray in a grid or in shapes, if its `t` is no more than `until`; with `is_any`, a hit
-/// that says only that there is one.
+/// of which only the existence counts.
 pub(super) fn ask_object(
     object: &Object<'_>,
     ray: &Ray,
@@ -343,12 +343,24 @@ pub(super) fn ask_object(
 }
 
 /// A hit of an object as one of the scene at a level.
-pub(super) fn outward(seen: &Seen, ray: &RayF64, level: usize, number: u32, hit: &Hit) -> SceneHit {
+pub(super) fn scene_hit(
+    object_ray: &ObjectRay,
+    ray: &RayF64,
+    level: usize,
+    number: u32,
+    hit: &Hit,
+) -> SceneHit {
     let mut path = [INVALID_ID; MAX_NESTING];
     if let Some(place) = path.get_mut(level) {
         *place = number;
     }
-    SceneHit { t: seen.outward(hit.t, ray), u: hit.u, v: hit.v, primitive: hit.primitive, path }
+    SceneHit {
+        t: object_ray.scene_t(hit.t, ray),
+        u: hit.u,
+        v: hit.v,
+        primitive: hit.primitive,
+        path,
+    }
 }
 
 const _: () = assert!(size_of::<SceneHit>() == 32);

@@ -70,7 +70,7 @@ impl Scene<'_> {
         let (min, max) = grid.bounds();
         let extent = (0..3).map(|axis| f64::from(max[axis] - min[axis])).fold(0.0, f64::max);
         Some(SceneSurface {
-            position: place.outward(facet.point)?.to_array(),
+            position: place.to_scene(facet.point)?.to_array(),
             above: place.start(&facet, 1.0, extent)?.to_array(),
             below: place.start(&facet, -1.0, extent)?.to_array(),
             normal: place.normal(facet.normal)?.to_array().map(round),
@@ -86,7 +86,7 @@ impl Place<'_> {
     }
 
     /// A point of the object in the scene.
-    fn outward(&self, point: DVec3) -> Option<DVec3> {
+    fn to_scene(&self, point: DVec3) -> Option<DVec3> {
         self.instances().rev().try_fold(point, |point, instance| instance.point(point))
     }
 
@@ -103,7 +103,7 @@ impl Place<'_> {
         // A lift larger than the object is of no use: give up.
         while lift <= extent {
             let wanted = facet.point + facet.normal * (side * lift);
-            let start = self.outward(wanted)?;
+            let start = self.to_scene(wanted)?;
             let line = LineF64 { origin: start.to_array(), direction: [0.0; 3] };
             let seen = self.line(&line).origin.map(|c| f64::from(round(c)));
             if DVec3::from_array(seen).distance(wanted) < 0.5 * lift {
