@@ -94,7 +94,7 @@ pub enum Error {
     /// This library was built without the method, and can neither build nor open its grids: turn on
     /// the feature of its name.
     MethodLeftOut(Method),
-    /// An older version built the grid with the method `brick`, which was removed: build the grid again.
+    /// The grid was built before 0.1.0 with the method `brick`, which was removed: build the grid again.
     MethodRemoved,
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),

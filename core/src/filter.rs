@@ -5,8 +5,8 @@
 //! one ray against one triangle. All of them give the same bits.
 //!
 //! ```text
-//! t = o - a    e = b - a    f = c - a    p = d x f    q = t x e
-//! U = t . p    V = d . q    det = e . p    W = det - U - V
+//! g = o - a    e = b - a    f = c - a    p = d x f    q = g x e
+//! U = g . p    V = d . q    det = e . p    W = det - U - V
 //! error = slope * max |e, f| + floor
 //! drop if one of U, V, W is below -error and one is above error
 //! ```
@@ -18,15 +18,15 @@
 //!
 //! d is the ray's direction, scaled by a power of two so that its largest component lies in [1, 2).
 //! Let D be the sum of the magnitudes of its components, R the largest magnitude of a component of
-//! t, E that of e and f, X the largest E of any triangle, u = 2^-24.
+//! g, E that of e and f, X the largest E of any triangle, u = 2^-24.
 //!
 //! Multiply out U, V and det into products of three factors. Their magnitudes sum up to no more than
 //! 2 D R E, 2 D R E and 2 D E^2. Each rounding multiplies a product by (1 + r), |r| <= u.
 //!
 //! ```text
 //! error of   roundings of each product                                       bound
-//! U          t 1, f 1, d * f 1, minus 1, t * p 1, sums 2           7     14 u D R E
-//! V          t 1, e 1, t * e 1, minus 1, d * q 1, sums 2           7     14 u D R E
+//! U          g 1, f 1, d * f 1, minus 1, g * p 1, sums 2           7     14 u D R E
+//! V          g 1, e 1, g * e 1, minus 1, d * q 1, sums 2           7     14 u D R E
 //! det        e 1, f 1, d * f 1, minus 1, e * p 1, sums 2           7     14 u D E^2
 //! W          those of U, V and det, and two of its own          2 + 2    28 u D R E + 18 u D E^2
 //! ```
@@ -37,10 +37,10 @@
 //! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the
 //! sheared plane: by the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 R, and by the
 //! distance between its ray and the line through the anchor ([`Approach::slack`]). If it reports a
-//! hit, the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Then
-//! moving them changes no edge function by more than 2 * (16 E s + 14 s^2); the 2 is for the
-//! direction, which multiplies areas of that plane. The rest is the second order of u, below
-//! 2^-19 of everything, and underflow:
+//! hit, the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Moving
+//! them changes an edge function by at most 16 E s + 14 s^2 on the sheared plane. U, V and W are these
+//! times |d.z|, which is below 2: z is the axis along which d is longest. The rest is the second order
+//! of u, below 2^-19 of everything, and underflow:
 //!
 //! ```text
 //! slope     u D (29 R + 19 X) + 32 slack       29 and 19 for 28 and 18: higher orders, 32 * 7 * 2^-53 R
@@ -79,7 +79,7 @@ const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
 const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 /// Growth of the floor with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
 const NEARBY_FLOOR: f32 = 2e-29;
-/// Shorter distances count as this one: no step towards the floor is denormal then, which would be slow.
+/// Shorter distances count as this one, so that no product on the way to the floor is denormal (slow).
 const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
 
 /// Directions that are longer or shorter are not scaled in f32.
@@ -278,12 +278,12 @@ impl<L: Lanes> LineFilter<L> {
     pub(crate) fn drops(&self, [a, b, c]: &[[L; 3]; 3]) -> L::Mask {
         // Written out: arrays that are mapped live in memory.
         let d = self.direction;
-        let t = minus(self.origin, *a);
+        let g = minus(self.origin, *a);
         let e = minus(*b, *a);
         let f = minus(*c, *a);
         let p = cross(d, f);
-        let q = cross(t, e);
-        let u = dot(t, p);
+        let q = cross(g, e);
+        let u = dot(g, p);
         let v = dot(d, q);
         let w = dot(e, p) - u - v;
 

@@ -23,19 +23,24 @@
 //! L is the largest coordinate of a corner relative to the origin, Z the range of the corners' t.
 //!
 //! ```text
-//! x, y     p - o 1 and 1, shear 1, product 1, difference 2        6 * 2^-53 L < 2^-50 L
-//! U, V, W  exact sign; products 2^11 times as large, 1 + 1        2^-41 of the value
-//! u, v     three of these, a division, a product; to f32          2^-24 + 2^-38 of the value
-//! t        the weights, of the largest |t| of a corner; to f32    2^-24 |t| + 2^-38 (|t| + Z)
+//! value      roundings                                              bound
+//! x, y       p - o 1 on two axes, shear 1, product 1,               6 * 2^-53 L < 2^-50 L
+//!            difference 2 (it may be 2 L)
+//! U, V, W    two products 1 each, each below 2^11 times             2^-41 of the value; the sign is exact
+//!            the value
+//! u, v       V or W, the sum U + V + W, a division,                 2^-24 + 2^-38 of the value
+//!            a product, and 1 to f32
+//! t          U, V and W as weights of the corners' t, and 1 to f32  2^-24 |t| + 2^-38 (|t| + Z)
 //! ```
 //!
 //! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they should be, rounded
 //! to f32. Corner and origin are f32: where their exponents differ by no more than 28, `p - o` is exact. From more
-//! than 2^50 times as far away as the triangle is large, all corners may have one place: a miss.
+//! than 2^50 times as far away as the triangle is large, all corners may be projected to one point:
+//! a miss.
 //!
 //! # The range
 //!
-//! Next to an end of the range the rounded t may not decide: a ray must not hit the surface that it leaves. A
+//! Next to an end of the range the rounded t must not decide: a ray must not hit the surface that it leaves. A
 //! triangle with all corners between the ends is in, one with all corners outside is out. For any other triangle the
 //! point T where the line meets its plane decides, exactly: in f64 with an error bound, and where that is not enough
 //! without rounding ([`exact`]), for all finite numbers. For a triangle that the ray grazes, the rounded t must also

@@ -1,4 +1,8 @@
-//! Building a tree: two passes over the triangles, then bin after bin in cache, then a tree on top.
+//! Building a tree: passes that sort triangles into bins, then bin after bin in cache, then a tree on top.
+//!
+//! One pass over the vertices finds their box. One over the triangles finds their keys; it runs twice if unused
+//! vertices widen the box. One over the keys moves entries into bins. The triangles are read again when their bin is
+//! cut.
 //!
 //! ```text
 //! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)
@@ -286,11 +290,12 @@ pub(super) fn finish(
     Ok(header)
 }
 
-/// No step of a node is smaller than that of a box of this part of the scene's extent. So a finite number can stand
-/// for the inverse of a zero direction ([`slab`](super::slab)).
+/// [`least_node`] in parts of the scene's extent: 254 steps of 2^-60.
 const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
 
-/// The size of that box in a scene.
+/// The size `least` of a box whose quantisation step is 2^-60 to 2^-59 of the scene's extent. No node has a smaller
+/// step: smaller boxes are quantised as boxes of this size. So a finite number can stand for the inverse of a zero
+/// direction ([`slab`](super::slab)).
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
 }
@@ -339,10 +344,11 @@ fn vertex_bounds(
 /// The inputs that the steps after binning share.
 struct BuildInputs<'w> {
     mesh: &'w TriangleMesh<'w>,
+    /// [`least_node`] of the scene.
     least: f32,
     /// Entries of each bin.
     sizes: &'w [u32],
-    /// Lower bits of a key, which do not choose a bin.
+    /// Number of low key bits that do not choose a bin.
     shift: u32,
 }
 

@@ -1,10 +1,10 @@
 //! Gives the triangles of a crowded unit new keys, in the box around their centres.
 //!
 //! ```text
-//! centers     read each triangle once: note twice its centre, find the box around all centres
+//! centers     read each triangle once: store min + max of its box, find the box around all centres
 //! new keys    for eight triangles: keys of their centres in that box; count the bin of each
 //!
-//! the notes   twice each centre: | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
+//! min + max (twice the centre) is stored in | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
 //! ```
 
 use fearless_simd::prelude::*;
@@ -21,8 +21,8 @@ use super::key::Keys;
 use super::layout::Entry;
 use super::subtree::slow_bounds;
 
-/// Finds the box around the centres of the triangles' boxes. Notes twice the centre of each: x and y in `spare`, z in
-/// place of the key. Out of line: few units are crowded, and inlined it would slow down all others.
+/// Finds the box around the centres of the triangles' boxes. Stores min + max of each box (twice the centre): x and
+/// y in `spare`, z in place of the key. Out of line: few units are crowded, and inlined it would slow down all others.
 #[inline(never)]
 pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mut [Entry]) -> Aabb {
     debug_assert!(spare.len() >= entries.len(), "too little room for the centres of a unit");
@@ -43,12 +43,12 @@ pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mu
     centers
 }
 
-/// Gives entries new keys, from the centres that [`centers`] noted, and counts those of each bin.
+/// Gives entries new keys, from the sums that [`centers`] stored, and counts those of each bin.
 pub(crate) struct NewKeys<'w> {
     pub(crate) entries: &'w mut [Entry],
     pub(crate) spare: &'w [Entry],
     pub(crate) rule: &'w Keys,
-    /// Lower bits of a key, which do not choose a bin.
+    /// Number of low key bits that do not choose a bin.
     pub(crate) shift: u32,
     pub(crate) counts: &'w mut [u32],
 }
@@ -59,9 +59,10 @@ impl Kernel for NewKeys<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { entries, spare, rule, shift, counts } = self;
-        debug_assert!(spare.len() >= entries.len(), "entries without notes");
-        for (entries, notes) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
-            let (xs, ys) = notes.as_flattened().split_at_checked(entries.len()).unwrap_or_default();
+        debug_assert!(spare.len() >= entries.len(), "entries without centres");
+        for (entries, stored) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
+            let (xs, ys) =
+                stored.as_flattened().split_at_checked(entries.len()).unwrap_or_default();
             match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {
                 (Some(&[a, b, c, d, e, f, g, h]), Some(xs), Some(ys)) if HAS_VECTORS => {
                     let zs = [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]];

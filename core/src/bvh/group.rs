@@ -1,7 +1,7 @@
 //! Up to 64 rays through the tree together.
 //!
 //! Each place on the stack has a child and the rays that met its box, one bit each. So a node is decoded and
-//! a leaf's triangles are fetched once for all of them, and no ray waits for another.
+//! a leaf's triangles are fetched once for all of them, and a ray is tested only below boxes that it met.
 //!
 //! ```text
 //! prepare the rays; if they start far apart and want their closest hits, interleave them (interleave.rs) or
@@ -9,9 +9,10 @@
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
-//!       few rays: intersect each with the eight boxes
-//!       many:     intersect the beam of all rays with the eight boxes, then sixteen rays at a time with each
-//!                 box that is left
+//!       more than eight rays: intersect their beam with the eight boxes; it decides some for all rays
+//!       then, whichever takes fewer vector tests:
+//!           ray by ray: each with all eight boxes
+//!           box by box: each that is undecided with sixteen rays at a time
 //!       push the children with the rays that met them, those that begin nearest last; in a large tree prefetch them
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
@@ -39,12 +40,13 @@ const FEW_RAYS: u32 = 8;
 
 /// Rays are scattered, and share little, if some origins lie farther apart than this part of the scene.
 const SCATTERED: f32 = 1.0 / 4.0;
-/// The same for a tree that exceeds [`SHARED_CACHE`]: little of it lies in the nodes that rays share.
+/// The same for a tree that exceeds [`SHARED_CACHE`]: the nodes that rays share are a smaller part of all, so rays
+/// count as scattered sooner.
 const SCATTERED_IN_HUGE: f32 = 1.0 / 32.0;
 
-/// Bytes of a tree that the caches of one core do not hold: that of a scan of 110 000 triangles.
+/// A tree of more bytes does not fit into the caches of one core. A scan of 110 000 triangles has such a tree.
 const CORE_CACHES: usize = 1 << 20;
-/// Bytes of a tree that the cache of all cores does not hold: that of a scan of 1.8 million triangles.
+/// A tree of more bytes does not fit into the cache of all cores. A scan of 1.8 million triangles has such a tree.
 const SHARED_CACHE: usize = 16 << 20;
 
 /// Returns true if scattered rays would wait for memory at each step of a tree.
@@ -102,8 +104,8 @@ pub(crate) struct Group<'r> {
     pub(crate) stack: &'r mut Stack,
     /// Number of rays in the first slots.
     pub(crate) count: usize,
-    /// The `t` up to which hits of each ray matter; none if all in their ranges do. A ray without a hit then has a miss
-    /// with this `t`, not [`Hit::MISS`](crate::ray::Hit::MISS).
+    /// For each ray the largest `t` of a hit that matters; `None`: its `t_max`. If given, a ray without a hit ends with
+    /// a miss whose `t` is this, not [`Hit::MISS`](crate::ray::Hit::MISS).
     pub(crate) until: Option<&'r [f32; GROUP]>,
 }
 
@@ -122,7 +124,7 @@ impl Group<'_> {
         }
     }
 
-    /// Calls `offer` with each box of a tree of boxes that rays meet, once and about from near to far: its number,
+    /// Calls `offer` with each box of a tree of boxes that rays meet, once and roughly front to back: its number,
     /// the rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
     #[inline(never)]
     pub(crate) fn offer(&mut self, level: SimdLevel, is_any: bool, offer: &mut Offer<'_>) -> u64 {
@@ -246,13 +248,14 @@ impl Met {
     ) {
         let count = mask.count_ones();
         let (mut some, mut all, mut enter) = (used, 0, f32x8::splat(simd, 0.0));
-        // Intersect the beam with them, if the rays are many.
+        // Intersect the beam of more than a few rays with the boxes.
         if count > FEW_RAYS {
             let beam = boxes.meet_beam(simd, beam);
             some &= beam.some;
             (all, enter) = (some & beam.all, beam.enter);
         }
-        // Intersect the rays with the boxes that the beam did not decide.
+        // Ray by ray, each ray takes one test of all eight boxes. Box by box, each box that the beam left undecided
+        // takes one test for every eight rays.
         let unsure = some & !all;
         if count <= octets(mask) * unsure.count_ones() {
             one_by_one(simd, boxes, rays, mask, self);
@@ -278,7 +281,7 @@ impl Met {
     }
 }
 
-/// Intersects few rays with all boxes of a node.
+/// Intersects rays with all eight boxes of a node, ray by ray.
 #[inline(always)]
 fn one_by_one<S: Simd>(
     simd: S,
@@ -310,7 +313,7 @@ fn one_by_one<S: Simd>(
     (met.slots, met.rays, met.near) = (bits(slots), masks, least.into());
 }
 
-/// Intersects many rays with the boxes of a node that their beam meets, sixteen rays at a time.
+/// Intersects rays with the boxes of a node that their beam did not decide, box by box: sixteen rays at a time.
 #[inline(always)]
 fn side_by_side<S: Simd>(
     simd: S,
@@ -335,7 +338,7 @@ fn side_by_side<S: Simd>(
                 continue;
             }
             let (near, is_met) = child.meet(simd, &rays.sixteen(simd, which));
-            // An invalid ray may have a NaN distance.
+            // Mask afterwards: an invalid ray has NaN distances and would count as a hit.
             let is_met = is_met & mask32x16::from_bitmask(simd, of_sixteen);
             by |= is_met.to_bitmask() << (16 * which);
             least = least.lesser(is_met.select(near, far_away));

@@ -1,8 +1,8 @@
 //! Scattered rays of a group, interleaved: each goes its own way through the tree, and eight take turns.
 //!
 //! Rays that start far apart share few nodes and triangles. In a tree larger than the caches of a core, a ray traced
-//! alone waits for memory at each step. Here a ray prefetches what its next step reads, and the others take theirs
-//! meanwhile.
+//! alone waits for memory at each step. Here a ray prefetches what its next step reads, while the others take their
+//! steps.
 //!
 //! ```text
 //! in turn, for each of eight rays:

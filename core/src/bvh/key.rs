@@ -21,9 +21,9 @@ pub(crate) const NO_KEY: u32 = u32::MAX;
 /// The map from boxes to keys.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Keys {
-    /// Twice the least corner of the cube.
+    /// The least corner of the cube, doubled as positions are.
     origin: Vec3A,
-    /// Half of the cells for each unit.
+    /// Cells per unit, halved because positions are doubled.
     scale: f32,
 }
 
@@ -32,7 +32,8 @@ const END: f32 = 1023.5;
 const CELL_BITS: u32 = 0x3ff;
 
 impl Keys {
-    /// Keys for boxes whose centres lie in `centers`. A box of a single point has one key.
+    /// Keys for boxes whose centres lie in `centers`. Boxes that are one point all get the same
+    /// key.
     pub(crate) fn new(centers: &Aabb) -> Self {
         let extent = centers.size().max_element();
         // Keep it finite: zero times infinity is a NaN.
@@ -48,7 +49,7 @@ impl Keys {
         self.of_twice(bounds.min + bounds.max)
     }
 
-    /// The key of a centre, of which twice is given: the sum of the corners of its box.
+    /// The key of a box, given min + max.
     #[inline(always)]
     pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
         let cell = (center - self.origin) * self.scale;

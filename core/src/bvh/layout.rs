@@ -11,16 +11,29 @@
 //!   roots. So each node below a root replaces one range of ids by eight: (m - 1) / 7 nodes at most for
 //!   `m` triangles.
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
-//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. A root and its part of those are
-//!   11 / 7 nodes.
+//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
+//!   1 + 4/7 = 11/7 nodes, itself included.
 //! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
 //!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
 //! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a crowded bin.
 //!   A crowded bin has more than [`CROWD`] triangles, and divisions nest at most [`DIVISIONS`] deep.
 //!
-//! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
+//! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles. A bin is
 //! sorted with `spare` as the second buffer; only bins of more than [`CROWD`] entries need more of it than that.
+//!
+//! So constants bound index and scratch, those of a build with one task (`HGRID_INDEX_BOUND`, 16 n + 640, and
+//! `HGRID_SCRATCH_BOUND`, 17 n + 320, in C; a test compares them for many `n`):
+//!
+//! ```text
+//! late roots <= 5 n / 4097 + 1                      behind crowded bins, see above
+//! nodes      <= 0.1475 n + 1 + 11 late / 7 + 3      1 as the first term is rounded up; 3 with the root of all
+//! index       = 128 + 4 n + 80 nodes, and paddings of at most 60 and 48
+//!            <= 15.8 n + 636                        n < 4097: one late root, for which 11 / 7 is rounded down to 1
+//!            <= 15.96 n + 682 <= 16 n + 640         otherwise
+//! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 63; one bin, or 16 triangles or more a bin
+//!            <= 16.5 n + 254
+//! ```
 
 use crate::arena::section_bytes;
 use crate::blob::HEADER_BYTES;
@@ -38,8 +51,10 @@ pub(crate) const LEAST_PIECE: usize = 32;
 
 const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
 
-/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost.
+/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost: 0.1475, or
+/// 11.8 bytes. With 4 bytes of ids and 0.16 of late roots an index takes less than 16 bytes a triangle.
 const NODES_PER_TRIANGLE: u64 = 24_780;
+/// A multiple of 7 * 24, so that 11/7 nodes for 24 triangles are a whole number of parts.
 const WHOLE: u64 = 168_000;
 
 /// The part of [`NODES_PER_TRIANGLE`] for the nodes below the roots.

@@ -47,7 +47,7 @@ pub(crate) struct Node {
     pub(crate) child: u32,
     /// Place of the first id of the first leaf; those of the others follow.
     pub(crate) first: u32,
-    /// Ids of each leaf.
+    /// Number of ids of each leaf.
     pub(crate) counts: [u8; WIDTH],
     /// Least x, y, z, then greatest x, y, z of each child, in steps from the origin.
     pub(crate) bounds: [[u8; WIDTH]; 6],
@@ -169,8 +169,8 @@ impl Node {
         Child::Leaf { first, count: (counts >> shift & 0xff) as u32 }
     }
 
-    /// Writes the boxes of the children that exist; `bounds` holds them all. No step is smaller than that of a box of
-    /// size `least`.
+    /// Writes the boxes of the children that exist; `bounds` holds them all, and `least` is
+    /// [`least_node`](super::build::least_node) of the scene.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
         self.frame(bounds, least);
         for (slot, child) in boxes.iter().enumerate() {
@@ -222,7 +222,7 @@ impl Node {
         }
     }
 
-    /// Sets origin and steps so that bounds can hold a box. No step is smaller than that of a box of size `least`.
+    /// Sets origin and steps so that bounds can hold a box, and one of size `least`.
     fn frame(&mut self, bounds: &Aabb, least: f32) {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut exponents = [0; 4];
@@ -260,7 +260,7 @@ impl Node {
     }
 }
 
-/// The exponents of a node that waits for its children; no other node has them.
+/// The `word` of a node that waits for its children; no other node has it, as their exponents are not 0.
 const WAITING: u32 = 0;
 
 /// The map from the sides of a box to bytes: the three low ones, then the three high ones, mirrored.

@@ -48,7 +48,7 @@ pub(crate) struct Rays {
     extent: f32,
     /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
-    /// Eight roundings of the origin farthest from the center: the growth of boxes that covers them.
+    /// 2^-21 of the largest coordinate of an origin relative to `center`: boxes grow by it, to cover eight roundings.
     spread: f32,
     /// The growth of boxes that covers both: `spread + origin_error`.
     pub(crate) growth: f32,
@@ -62,7 +62,7 @@ pub(crate) struct Rays {
     direction: [PerRay; 3],
     slope: PerRay,
     floor: PerRay,
-    /// From `t` to distances.
+    /// Factor from `t` to scaled distance.
     scale: PerRay,
     given: [Ray; GROUP],
     /// The closest hit of each ray so far. Before the first it is a miss, whose `t` is the end.

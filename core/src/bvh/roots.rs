@@ -4,7 +4,7 @@
 //! ```text
 //! for each unit (a crowded bin, or bins side by side that make up a root):
 //!     crowded: new keys in the box around its centres, new bins; then their units
-//!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
+//!     else:    sort by key, split where high bits of the key change, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
 //! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
@@ -74,7 +74,7 @@ fn copy_what_fits<T: Copy>(from: &[T], to: Option<&mut [T]>) {
 /// The roots of a range of units.
 pub(crate) struct Roots<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
-    /// No step of a node is smaller than that of a box of this size.
+    /// [`least_node`](super::build::least_node) of the scene.
     pub(crate) least: f32,
     /// The entries, over which the records are written.
     pub(crate) entries: &'w mut [Entry],
@@ -88,7 +88,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) nodes: &'w mut [Node],
     /// The number of the first of the nodes in the index.
     pub(crate) child: u32,
-    /// One for each bin of the tree, so no fewer than any division of it has bins.
+    /// Counters for bins: one for each bin of the tree, and a division never has more bins.
     pub(super) counts: &'w mut [u32],
     pub(super) subtree: &'w mut Subtree,
     pub(super) level: SimdLevel,
@@ -125,8 +125,8 @@ impl Roots<'_> {
         self.cut(range);
     }
 
-    /// Makes roots of sorted entries: halves them where a high bit of the key changes, until parts
-    /// are small enough.
+    /// Makes roots of sorted entries: splits them where the highest bit of their keys changes, until parts are small
+    /// enough.
     fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {

@@ -7,12 +7,12 @@
 //!
 //! The test is done in f32 and must never miss a box that holds a hit:
 //!
-//! - **Relative errors.** A side is subtracted, multiplied and added with at most six roundings. So `far` is
+//! - **Relative errors.** A distance takes at most six roundings. So `far` is
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
-//! - **Absolute errors** where the terms cancel: absorbed by the margin of quantised boxes ([`node`](super::node)).
-//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by 2^-38 of
-//!   the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The relative
-//!   margin covers the first; [`growth_of_range`] adds twice the second.
+//! - **Absolute errors.** The margin of quantised boxes absorbs those where terms cancel ([`node`](super::node)).
+//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by
+//!   2^-38 of the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The
+//!   relative margin covers the first; [`growth_of_range`] adds twice the second.
 //! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
 //!   2^-6 of a step, so a ray inside one leaves it behind the end of the scene, and one outside never
 //!   enters. Products stay finite as long as the scene is smaller than 2^50; beyond, a NaN counts as a

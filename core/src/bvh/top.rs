@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! parts = [all roots]
-//! until there are eight: cut the part with the largest surface in two, at the least SAH cost
-//!                        of sixteen bins an axis by centre; a cost counts leaves of four triangles
+//! until there are eight: split the part with the largest surface by binned SAH
+//!                        (16 bins an axis, by centre; an item costs ceil(triangles / 4))
 //! parts of one root become that root's node, the others nodes of their own, breadth first
 //! ```
 //!
@@ -48,7 +48,8 @@ impl RootItem {
         Vec3A::from_array(self.min) + Vec3A::from_array(self.max)
     }
 
-    /// The cost of entering it: its leaves, about.
+    /// The cost of entering it: its triangles, in fours. A factor changes no cut, so the four decides only how costs
+    /// are rounded: items of up to four triangles cost the same.
     #[inline(always)]
     fn cost(&self) -> f32 {
         as_cost(self.count)
@@ -106,8 +107,7 @@ pub(crate) struct Top {
 /// Makes the nodes over some items and writes all but the topmost to `nodes`. `record` returns the node of a subtree,
 /// which becomes a child, and its levels. Returns `None` if `nodes` is too short.
 ///
-/// `child` is where `nodes` will lie in the index. No step is smaller than that of a box of size
-/// `least`.
+/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::build::least_node) of the scene.
 pub(crate) fn build(
     items: &mut [RootItem],
     record: impl Fn(u32) -> (Node, u32),

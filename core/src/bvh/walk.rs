@@ -4,7 +4,8 @@
 //! node = root
 //! loop: intersect the ray with the eight boxes of the node
 //!       descend into the nearest child that is met, push the others, the nearest last
-//!       a leaf: test its triangles at once; a hit ends the ray there
+//!       a leaf: filter its triangles, all eight together; decide those that pass one by one in f64;
+//!               a hit ends the ray there
 //!       pop the next child that the ray enters before its end
 //! ```
 
@@ -47,7 +48,7 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) ray: &'r Ray,
     /// The part of its range in which hits matter: from `t_min` or the last hit that was found before, to `t_max` or
-    /// the closest hit that something else has.
+    /// the closest hit in another instance.
     pub(crate) part: [f32; 2],
     pub(crate) cull: Cull,
     /// The box of the scene.
@@ -305,7 +306,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 child = node.child(nearest);
             }
 
-            // Test the triangles of a leaf at once, and decide what passes.
+            // Filter the triangles of a leaf, all eight together. Decide those that pass one by one in f64.
             let Child::Leaf { first, count } = child else { continue };
             let ids = bvh.leaf(first, count);
             let Some(rest) = budget.checked_sub(1) else { return true };

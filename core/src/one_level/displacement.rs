@@ -5,9 +5,9 @@
 //!
 //! ```text
 //! row 0   x . x x . .                offset 0
-//! row 1     . x . . x .              offset 0      x of row 1 fall into holes of row 0
-//! row 2           . x x . . x        offset 3
-//! table   x x x x x ...
+//! row 1   . x . . x .                offset 0      x of row 1 fall into holes of row 0
+//! row 2           . x x . . x        offset 4
+//! table   x x x x x x x . . x
 //! ```
 //!
 //! Plain first fit tries every slot from the first free one: quadratic, minutes where the rest of a

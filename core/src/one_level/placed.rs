@@ -1,4 +1,4 @@
-//! Finds the cells of a batch of primitives before it spreads the first of them.
+//! Finds the cells of a batch of primitives before it enters the first of them into their lists.
 //!
 //! The number of cells of a primitive is unpredictable, so a branch on it is often mispredicted, and the processor
 //! discards its work on the next primitives. A pass therefore finds the cells of a whole batch first, and branches on

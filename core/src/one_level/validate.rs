@@ -1,10 +1,9 @@
 //! Proof that a foreign blob is a grid of its mesh, in O(n) and without memory.
 //!
-//! A grid answers right if every triangle is listed in every cell that its range covers, and it is
-//! what a build makes if nothing else is listed. With ids that strictly ascend in each list and
-//! each listed triangle covering the list's cell, every listed pair (cell, triangle) is a right one
-//! and none is listed twice; so there are as many pairs as the ranges have cells if and only if
-//! none is missing. No bitmap, no sorting: one sum against another.
+//! The pairs of a cell and a triangle that the lists hold must be those of the triangles' cell ranges. First, each
+//! listed triangle covers its list's cell, so every listed pair is a right one. Second, ids ascend strictly in each
+//! list, so no pair is listed twice. So all pairs are there if and only if there are as many as the ranges have cells.
+//! This takes no bitmap and no sorting: it compares one sum with another.
 //!
 //! Two cells with equal lists could still share a slot while another slot stays orphaned. A sum of
 //! scrambled slot numbers over the cells and one over the slots with lists tell accidents of that
@@ -24,7 +23,7 @@ use crate::error::Error;
 use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
 
-/// Checks that the header says what the mesh and Woo's rule say.
+/// Checks that the header says what the mesh and the resolution rule ([`cell`](crate::cell)) say.
 pub(crate) fn check_header(
     header: &Header,
     lattice: &Lattice,

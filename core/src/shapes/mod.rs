@@ -102,11 +102,11 @@ pub struct ShapeHit {
     pub v: f32,
 }
 
-/// Tests a shape: gets its number and the ray with the range that is left, `t_max` being that of the closest
-/// hit so far; answers where the ray hits it, if it does.
+/// Tests a shape. The test receives the number of a shape and the ray; `t_max` is that of the closest hit so far. It
+/// returns the hit, if any.
 ///
 /// An answer outside the range, or NaN, is no hit. The test may be asked about a shape that the ray does not meet; it
-/// is asked about each shape at most once for a ray, about from near to far, but not exactly. It may query this tree
+/// is asked about each shape at most once for a ray, roughly front to back. It may query this tree
 /// and others. In a batch, calls for different rays alternate.
 ///
 /// All queries find the same hits if every hit lies inside the box of its shape, rounding included, and if the answer

@@ -48,7 +48,7 @@ pub(super) struct Grow<'w> {
     pub(super) first: u32,
     /// The factor that scales lengths before areas are computed from them.
     pub(super) unit: f32,
-    /// No step of a node is smaller than that of a box of this size.
+    /// [`least_node`](crate::bvh::build::least_node) of the scene.
     pub(super) least: f32,
 }
 
