@@ -122,11 +122,14 @@
  * triangle was hit. Masks can leave meshes out. Several grids are asked one after the other; let each hit
  * shorten the ray:
  *
+ *   // grids: an array of count hgrid_grid; ray: an hgrid_ray
+ *   hgrid_hit hit = {INFINITY, 0, 0, HGRID_INVALID_ID}, found;
+ *   size_t object = 0;
  *   for (size_t i = 0; i < count; i++)
  *       if (hgrid_intersect(&grids[i], &ray, NULL, &found) && found.t < hit.t)
  *           hit = found, object = i, ray.t_max = found.t;
  *
- * where hit.t begins as INFINITY; a shadow ray is blocked if any grid blocks it.
+ * A shadow ray is blocked if any grid blocks it.
  *
  * Pointers
  * --------
@@ -230,19 +233,19 @@
 
 /**
  * Bytes of scratch that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. With 32 bits the result wraps beyond 252 million triangles.
+ * default configuration, for a build by one task: a constant expression. With less scratch than its tasks need, a
+ * build runs fewer of them. With 32 bits the result wraps beyond 252 million triangles.
  */
 #define HGRID_SCRATCH_BOUND(triangles) ((size_t)17 * (triangles) + 320)
 
 /**
- * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, bytes of
- * index. A scan takes a sixth of it or less. With 32 bits the result wraps beyond 50 million
- * triangles.
+ * Bytes of index that are enough for any mesh with `HGRID_CONFIG_INIT_ONE_LEVEL`: a constant expression. A scan takes
+ * a sixth of it or less. With 32 bits the result wraps beyond 50 million triangles.
  */
 #define HGRID_INDEX_BOUND_ONE_LEVEL(triangles) ((size_t)85 * (triangles) + 1280)
 
 /**
- * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, bytes of scratch.
+ * Bytes of scratch that are enough for any mesh with `HGRID_CONFIG_INIT_ONE_LEVEL`: a constant expression.
  */
 #define HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles) ((size_t)5 * (triangles) + 1024)
 
@@ -584,8 +587,7 @@ typedef struct hgrid_config {
      */
     uint32_t depth;
     /**
-     * 0; older versions had the cell size of a removed method here. Another number is
-     * `HGRID_ERROR_STRUCT_SIZE`.
+     * 0. Another number is `HGRID_ERROR_STRUCT_SIZE`.
      */
     uint32_t reserved;
     /**
@@ -886,8 +888,8 @@ typedef struct hgrid_query_options {
     /**
      * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
      * any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, for shapes neither
-     * boxes nor view. Each thread needs its own, and a filter or test may not lend it again while the call
-     * runs. Queries of one ray or point do not look at it.
+     * boxes nor view. Each thread needs its own. A filter or test that starts a batch must pass other
+     * scratch. Queries of one ray or point do not look at it.
      */
     void *scratch;
     /**
@@ -1173,8 +1175,8 @@ typedef struct hgrid_boxes {
      *
      * `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
      * NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
-     * others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
-     * tree and others, and may not be left by `longjmp` or by a C++ exception.
+     * others, roughly front to back, and for each shape at most once for each ray. It may query this
+     * tree and others, and must not be left by `longjmp` or by a C++ exception.
      */
     bool (*test)(void *context,
                  uint32_t shape,
@@ -1228,7 +1230,8 @@ typedef struct hgrid_instance {
     /**
      * Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
      * Rotations, mirrors, shears and scales of any kind, as long as the matrix times its inverse in `float` is the
-     * identity to 2^-10: with any scales along the axes, turned ones up to a condition of about 10 000.
+     * identity to 2^-10. That allows axis-aligned scales of any ratio; with rotation or shear a condition number up to
+     * about 10^4.
      */
     float linear[3][3];
     /**
@@ -1334,7 +1337,7 @@ typedef struct hgrid_scene_options {
     void *context;
     /**
      * Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
-     * far and about each triangle at most once; instances come about from near to far, so a hit that it accepts may
+     * far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
      * be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
      * are not shown to it.
      */
@@ -1630,7 +1633,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_CANNOT_REFIT -47
 
 /**
- * The blob was built by an older version with the method brick, which was removed: build it with another method.
+ * The blob was built before 0.1.0 with the method brick, which was removed: build it with another method.
  */
 #define HGRID_ERROR_METHOD_REMOVED -48
 

@@ -25,7 +25,8 @@ const _: () = assert!(HGRID_MAX_NESTING == MAX_NESTING);
 pub struct hgrid_instance {
     /// Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
     /// Rotations, mirrors, shears and scales of any kind, as long as the matrix times its inverse in `float` is the
-    /// identity to 2^-10: with any scales along the axes, turned ones up to a condition of about 10 000.
+    /// identity to 2^-10. That allows axis-aligned scales of any ratio; with rotation or shear a condition number up to
+    /// about 10^4.
     pub linear: [[f32; 3]; 3],
     /// The object's number in the scene, from 0.
     pub object: u32,
@@ -121,7 +122,7 @@ pub struct hgrid_scene_options {
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
     /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
-    /// far and about each triangle at most once; instances come about from near to far, so a hit that it accepts may
+    /// far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
     /// be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
     /// are not shown to it.
     pub filter: Option<

@@ -53,8 +53,8 @@ pub struct hgrid_boxes {
     ///
     /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
     /// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
-    /// others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
-    /// tree and others, and may not be left by `longjmp` or by a C++ exception.
+    /// others, roughly front to back, and for each shape at most once for each ray. It may query this
+    /// tree and others, and must not be left by `longjmp` or by a C++ exception.
     pub test: Option<
         unsafe extern "C" fn(
             context: *mut c_void,

@@ -127,7 +127,7 @@ pub const HGRID_ERROR_NO_MESH: hgrid_status = -46;
 /// The blob is no tree (`HGRID_METHOD_BVH`), or `hgrid_pack` wrote it: refit the tree, then pack it.
 pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 
-/// The blob was built by an older version with the method brick, which was removed: build it with another method.
+/// The blob was built before 0.1.0 with the method brick, which was removed: build it with another method.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
 /// The blob is built over other primitives: open it with the function for triangles, shapes or instances. Or a scene

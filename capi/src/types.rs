@@ -199,8 +199,7 @@ pub struct hgrid_config {
     pub subdivide_above: u32,
     /// For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
     pub depth: u32,
-    /// 0; older versions had the cell size of a removed method here. Another number is
-    /// `HGRID_ERROR_STRUCT_SIZE`.
+    /// 0. Another number is `HGRID_ERROR_STRUCT_SIZE`.
     pub reserved: u32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
