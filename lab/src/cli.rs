@@ -61,6 +61,7 @@ impl Cli {
         };
         let parse = |words: &[OsString]| {
             Self::try_parse_from(iter::once("hgrid".into()).chain(words.iter().cloned()))
+                .map_err(|error| with_two_scenes(error, words))
         };
         if words.first().is_some_and(is_own) {
             return parse(&words);
@@ -81,6 +82,23 @@ impl Cli {
             _ => parsed,
         }
     }
+}
+
+/// Tells how one picture shows two scenes, if an error is about the second scene of `render`.
+fn with_two_scenes(mut error: clap::Error, words: &[OsString]) -> clap::Error {
+    let [command, first, ..] = words else { return error };
+    let first = first.to_string_lossy();
+    if let Some(ContextValue::String(second)) = error.get(ContextKind::InvalidArg)
+        && error.kind() == ErrorKind::UnknownArgument
+        && command == "render"
+        && !first.starts_with('-')
+        && !second.starts_with('-')
+    {
+        let hint = format!("a picture has one scene: `{first}+{second}` shows both");
+        let hints = ContextValue::StyledStrs(vec![hint.into()]);
+        error.insert(ContextKind::Suggested, hints);
+    }
+    error
 }
 
 /// Returns true if a word may be meant as a command: it is no option, and has nothing that names of scenes have.

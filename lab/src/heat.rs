@@ -31,9 +31,9 @@ pub enum Counter {
     Cost,
     /// Triangles tested
     PrimitiveTests,
-    /// Cells entered, empty ones included
+    /// Leaves of a tree; cells, empty ones included
     CellSteps,
-    /// Subgrids and levels entered
+    /// Nodes of a tree; subgrids and levels
     GridSteps,
 }
 

@@ -110,9 +110,9 @@ pub struct Measurement {
     pub hits: u64,
     /// Work of all rays, each traced alone, divided by their number.
     pub primitive_tests_per_ray: f64,
-    /// Cells entered, likewise.
+    /// Leaves of a tree, or cells, empty ones included; likewise.
     pub cell_steps_per_ray: f64,
-    /// Subgrids and levels entered, likewise.
+    /// Nodes of a tree, or subgrids and levels; likewise.
     pub grid_steps_per_ray: f64,
     /// The most tests and steps that one ray took.
     pub largest_ray_cost: u64,

@@ -48,9 +48,14 @@ pub fn run(args: &PackArgs) -> Result<()> {
     let bytes = HumanCount(blob.bytes().len() as u64);
     let triangles = triangles(scene.indices.len());
     let (output, method) = (args.output.display(), args.method.name());
+    let note = if scene.indices.is_empty() {
+        format!("\n`{}` has no triangles: every ray misses", args.scene.display())
+    } else {
+        String::new()
+    };
     writeln!(
         io::stdout(),
-        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles}"
+        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles}{note}"
     )?;
     Ok(())
 }

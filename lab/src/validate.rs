@@ -13,6 +13,7 @@ use crate::cli::blob::ValidateArgs;
 use crate::plural::{counted, triangles};
 use crate::render::seconds;
 use crate::scene::Scene;
+use crate::scene::format::Format;
 
 /// Proves a blob and prints the result.
 ///
@@ -21,6 +22,11 @@ use crate::scene::Scene;
 pub fn run(args: &ValidateArgs) -> Result<()> {
     let path = &args.blob;
     let file = path.display();
+    if let Ok(format) = Format::of(path)
+        && format != Format::Blob
+    {
+        bail!("`{file}` is {}, not a blob: `hgrid pack` makes one", format.article());
+    }
     let blob = Blob::read(path).with_context(|| format!("cannot read `{file}`"))?;
     let info = BlobInfo::peek(blob.bytes())?;
     if info.content == Content::Packed {

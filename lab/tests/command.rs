@@ -254,7 +254,12 @@ fn packed_files_are_described_proved_and_rendered() {
     damaged[128 + 20] ^= 0x40;
     fs::write(folder.0.join("damaged.hgrid"), damaged).unwrap();
     assert!(folder.fails("validate damaged.hgrid").unwrap().contains("damaged"));
-    assert!(folder.fails("validate a.obj").unwrap().contains("not a blob"));
+    let said = folder.fails("validate a.obj").unwrap();
+    let expected = "`a.obj` is an OBJ file, not a blob: `hgrid pack` makes one";
+    assert!(said.contains(expected), "{said}");
+    fs::write(folder.0.join("points.obj"), "v 0 0 0\n").unwrap();
+    let said = folder.says("pack points.obj -o points.hgrid").unwrap();
+    assert!(said.contains("`points.obj` has no triangles: every ray misses"), "{said}");
     assert!(folder.fails("validate a.hgrid --mesh a.obj").unwrap().contains("leave out --mesh"));
     assert!(folder.fails("info nothing.hgrid").unwrap().contains("cannot open it"));
 }

@@ -67,7 +67,7 @@ Examples:
   hgrid table dragon.ply --json > table.json     every single time, and the machine
 
 Close what else is running: the times are those of one thread, but for builds with --threads, and
-they believe the clock.";
+they are wall-clock times.";
 
 pub(super) const FIGURES_EXAMPLES: &str = "\
 Examples:

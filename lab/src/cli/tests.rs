@@ -93,7 +93,13 @@ fn a_misspelt_command_is_no_file() {
     }
     let said = message("xyz one.obj");
     assert!(said.contains("no command or file `xyz`\n"), "{said}");
-    assert!(message("a.ply b.ply").contains("unexpected argument 'b.ply'"));
+    let said = message("a.ply b.ply");
+    assert!(said.contains("unexpected argument 'b.ply'"), "{said}");
+    assert!(said.contains("one scene: `a.ply+b.ply` shows both"), "{said}");
+    assert!(message("render a.ply b.ply").contains("shows both"));
+    for other in ["a.ply --sise 9", "info a.ply b.ply"] {
+        assert!(!message(other).contains("shows both"), "{other}");
+    }
 }
 
 #[test]

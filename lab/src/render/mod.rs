@@ -123,8 +123,8 @@ pub(crate) fn unseen(picture: &View, scene: &Scene, model: Option<&Model>) -> &'
         return "no ray hits anything: its coordinates are larger than 1e30; scale them down";
     }
     if picture.view.is_none() && picture.eye.is_none() {
-        return "no ray hits anything: what it shows is smaller than a pixel; take a larger --size, or look from \
-                nearby, by --eye and --target";
+        return "no ray hits anything: the mesh may be smaller than a pixel, or out of view. Take a larger --size, or \
+                look from nearby, by --eye and --target";
     }
     "no ray hits anything; look from elsewhere, by --view, or by --eye and --target"
 }
@@ -314,7 +314,11 @@ mod tests {
             ("--json", flat, "no triangle has finite corners and an area"),
             ("--json", not_finite, "no triangle has finite corners and an area"),
             ("--json", huge, "its coordinates are larger than 1e30; scale them down"),
-            ("--json", apart, "smaller than a pixel; take a larger --size"),
+            (
+                "--json",
+                apart,
+                "the mesh may be smaller than a pixel, or out of view. Take a larger",
+            ),
             ("--json", "v 0 0 0\n", "it has no triangles"),
             ("--json", nowhere, "no vertex has finite coordinates"),
         ];

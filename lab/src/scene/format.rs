@@ -130,7 +130,9 @@ impl Format {
         }
     }
 
-    const fn article(self) -> &'static str {
+    /// Returns what a file of the format is, with an article.
+    #[must_use]
+    pub const fn article(self) -> &'static str {
         match self {
             Self::Ply => "a PLY file",
             Self::Obj => "an OBJ file",
@@ -147,12 +149,16 @@ impl Format {
 }
 
 /// The marks of foreign files that are found under the names of meshes, or beside them.
-const FOREIGN: [(&[u8], &str); 15] = [
+const FOREIGN: [(&[u8], &str); 19] = [
     (b"version https://git-lfs", "a pointer of Git LFS: fetch the file with `git lfs pull`"),
     (b"<!DOCTYPE", "a web page: the download went wrong"),
     (b"<html", "a web page: the download went wrong"),
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"GIF8", "a GIF picture"),
+    (b"II*\0", "a TIFF picture"),
+    (b"MM\0*", "a TIFF picture"),
+    (b"#?RADIANCE", "an HDR picture"),
     (b"PK\x03\x04", "a ZIP archive (or 3MF, or USDZ): unpack it first"),
     (b"\x1f\x8b", "packed with gzip: unpack it first"),
     (b"BZh", "packed with bzip2: unpack it first"),
@@ -166,6 +172,12 @@ const FOREIGN: [(&[u8], &str); 15] = [
 ];
 
 fn foreign(start: &[u8]) -> Option<&'static str> {
+    // PPM and its like: P, a digit and a white space.
+    if let [b'P', b'1'..=b'6', space, ..] = start
+        && space.is_ascii_whitespace()
+    {
+        return Some("a PPM, PGM or PBM picture");
+    }
     FOREIGN.iter().find(|(mark, _)| start.starts_with(mark)).map(|&(_, name)| name)
 }
 
@@ -206,6 +218,13 @@ mod tests {
             message(b"\x89PNG\r\n", Some(Format::Obj)),
             "it is a PNG picture, not an OBJ file"
         );
+        for ppm in [&b"P6\n4 4\n255\n"[..], b"P3 1 1 255"] {
+            assert_eq!(
+                message(ppm, Some(Format::Ply)),
+                "it is not a PLY file, in spite of its name; it is a PPM, PGM or PBM picture"
+            );
+        }
+        assert_eq!(message(b"GIF89a", Some(Format::Stl)), "it is a GIF picture, not an STL file");
         assert_eq!(
             message(b"ISO-10303-21;", None),
             format!("it is a STEP file: a mesh is read from {ENDINGS}")
