@@ -80,6 +80,21 @@ fn a_blob_overwrites_none_of_its_sources() {
 }
 
 #[test]
+fn results_overwrite_no_mesh() {
+    let folder = Folder::new("results").unwrap();
+    folder.says("pack a.obj -o blob").unwrap();
+    for (words, expected) in [
+        ("--json a.obj procedural:knot:500", "`a.obj` would be a mesh by its name"),
+        ("blob --json ./blob", "`blob` would be overwritten by its own results"),
+        ("a.obj a.obj+blob --json blob", "`blob` would be overwritten by its own results"),
+    ] {
+        let said = folder.fails(&format!("compare {words}")).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+    folder.says("validate blob").unwrap();
+}
+
+#[test]
 fn a_picture_overwrites_none_of_its_sources() {
     let folder = Folder::new("pictures").unwrap();
     folder.says("pack a.obj -o blob").unwrap();
