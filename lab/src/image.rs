@@ -47,8 +47,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     })
 }
 
-/// Refuses to overwrite the file or the two files that a scene is named by, or a buffer that they name, by a blob or a
-/// picture of it.
+/// Refuses to overwrite the file or the two files that a scene is named by, or a buffer that they name, by a blob, a
+/// picture or results of it.
 ///
 /// # Errors
 /// If the output is one of them.

@@ -58,19 +58,40 @@ fn a_blob_overwrites_none_of_its_sources() {
     }
     folder.says("validate a.hgrid").unwrap();
     folder.says("pack a.hgrid -o b.hgrid").unwrap();
-    // A glTF file names its buffer, with spaces as %20.
-    let buffer = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "b%20c.bin", "byteLength": 4 }] }"#;
-    fs::write(folder.0.join("b.gltf"), buffer).unwrap();
-    fs::write(folder.0.join("b c.bin"), "data").unwrap();
-    let output = ["pack", "b.gltf", "-o", "b c.bin"];
-    let command = Command::new(env!("CARGO_BIN_EXE_hgrid"))
-        .current_dir(&folder.0)
-        .args(output)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&command.stderr).into_owned();
-    assert!(said.contains("`b c.bin` holds a part of `b.gltf`"), "{said}");
-    assert_eq!(fs::read(folder.0.join("b c.bin")).unwrap(), b"data");
+    // A glTF file names its buffer, with spaces as %20. It may have any name, and be binary.
+    let json = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "b%20c.bin", "byteLength": 4 }] }"#;
+    let json = format!("{json:92}");
+    let length = |bytes: u32| bytes.to_le_bytes();
+    let head = [&b"glTF\x02\0\0\0"[..], &length(112), &length(92), b"JSON"].concat();
+    let files = [("b.gltf", Vec::new()), ("b", Vec::new()), ("b.glb", head.clone()), ("c", head)];
+    for (name, head) in files {
+        fs::write(folder.0.join(name), [head, json.clone().into_bytes()].concat()).unwrap();
+        fs::write(folder.0.join("b c.bin"), "data").unwrap();
+        let output = ["pack", name, "-o", "b c.bin"];
+        let command = Command::new(env!("CARGO_BIN_EXE_hgrid"))
+            .current_dir(&folder.0)
+            .args(output)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&command.stderr).into_owned();
+        assert!(said.contains(&format!("`b c.bin` holds a part of `{name}`")), "{said}");
+        assert_eq!(fs::read(folder.0.join("b c.bin")).unwrap(), b"data");
+    }
+}
+
+#[test]
+fn results_overwrite_no_mesh() {
+    let folder = Folder::new("results").unwrap();
+    folder.says("pack a.obj -o blob").unwrap();
+    for (words, expected) in [
+        ("--json a.obj procedural:knot:500", "`a.obj` would be a mesh by its name"),
+        ("blob --json ./blob", "`blob` would be overwritten by its own results"),
+        ("a.obj a.obj+blob --json blob", "`blob` would be overwritten by its own results"),
+    ] {
+        let said = folder.fails(&format!("compare {words}")).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+    folder.says("validate blob").unwrap();
 }
 
 #[test]

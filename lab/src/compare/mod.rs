@@ -37,15 +37,18 @@ pub mod system;
 mod tables;
 pub mod workloads;
 
+use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write as _};
+use std::path::Path;
 
 use anyhow::{Context as _, Error, Result, ensure};
 use clap::ValueEnum as _;
 use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
-use crate::image::{check_writable, make_folder};
+use crate::image::{check_sources, check_writable, make_folder};
+use crate::scene::format::Format;
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
@@ -61,13 +64,13 @@ use workloads::{Amount, Workload};
 /// built, two methods of hgrid disagree, or a file cannot be written.
 pub fn run(args: &CompareArgs) -> Result<()> {
     args.check()?;
+    if let Some(path) = &args.json {
+        check_results(path, &args.scenes)?;
+    }
     let mut systems = methods_of(&args.methods, args.quality.unwrap_or_default());
     systems.extend(peers::systems(&args.peers)?);
     if let Some(folder) = &args.output {
         make_folder(folder)?;
-    }
-    if let Some(path) = &args.json {
-        check_writable(path)?;
     }
     process::pin_to_one_core()?;
 
@@ -91,6 +94,19 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         comparison.draw(folder)?;
     }
     Ok(())
+}
+
+/// Refuses to write results over a mesh: the `--json` of other commands has no file behind it, so a mesh may follow.
+fn check_results(path: &Path, scenes: &[OsString]) -> Result<()> {
+    ensure!(
+        Format::named(path).is_none(),
+        "`{}` would be a mesh by its name: name a file like x.json behind --json",
+        path.display()
+    );
+    for scene in scenes {
+        check_sources(path, scene, "results")?;
+    }
+    check_writable(path)
 }
 
 /// Removes systems and workloads that cannot take the instances or spheres that are shown, and prints their names.

@@ -14,6 +14,7 @@ use gltf::buffer::{Source, View};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Primitive, Semantic};
 
+use super::format::Format;
 use super::model::{IDENTITY, Mesh, Model, Transform};
 use crate::vector::round;
 
@@ -57,9 +58,10 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
     Ok(model)
 }
 
-/// Returns the files that a glTF file names beside it; none if it cannot be read, which loading it reports.
+/// Returns the files that a file names beside it, if its content is glTF; none if it cannot be read, which loading it
+/// reports.
 pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
-    let is_gltf = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+    let is_gltf = Format::of(path).is_ok_and(|format| format == Format::Gltf);
     let document =
         if is_gltf { fs::read(path).ok().and_then(|bytes| parse(&bytes).ok()) } else { None };
     let folder = path.parent().unwrap_or(Path::new(""));
