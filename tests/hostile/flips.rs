@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::thread;
 
-use hgrid_core::{Error, Grid, Method};
+use hgrid_core::{Error, Grid, Method, refit};
 use hgrid_tests::copy::{CHECKSUM, Copy, MESH};
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays, seeds};
 use hgrid_tests::owned::{Owned, prove};
@@ -86,6 +86,12 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
             Ok(grid) => {
                 let rays = fixed_rays(grid.bounds(), rays);
                 ends(&grid, &rays);
+                if seed.config.method() == Method::Bvh {
+                    let mut refitted = Copy::of(copy.bytes());
+                    if refit(refitted.bytes_mut(), &view).is_ok() {
+                        ends(&Grid::open(refitted.bytes(), view).unwrap(), &rays);
+                    }
+                }
                 if let Err(error) = prove(&grid) {
                     let length = seed.blob.len() as u64;
                     let is_fit = matches!(error, Error::Corrupt { offset } if offset < length);

@@ -151,7 +151,8 @@ impl Tree<'_> {
                 level.rest = node.inner();
                 for (slot, corners) in (0..).zip(&mut level.boxes) {
                     let mut bounds = Aabb::EMPTY;
-                    if let Child::Leaf { first, count } = node.child(slot) {
+                    // The first id of an unused slot may lie anywhere: the check does not look at it.
+                    if let Child::Leaf { first, count: count @ 1.. } = node.child(slot) {
                         let first = first as usize;
                         let leaf = ids.get(first..first.saturating_add(count as usize));
                         for &id in leaf.or_bug("a leaf behind the ids").unwrap_or_default() {
