@@ -77,7 +77,13 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let cannot = || format!("cannot animate `{name}`");
     let (report, hits) = animate(&scene, &plan, write, &mut progress).with_context(cannot)?;
     drop(progress);
-    ensure!(hits > 0, "{}: {}", cannot(), unseen(&args.picture, &scene, None));
+    ensure!(
+        hits > 0,
+        "{}: {}{}",
+        cannot(),
+        unseen(&args.picture, &scene, None),
+        args.output.as_ref().map(|_| ". The pictures that it wrote are empty").unwrap_or_default()
+    );
 
     let mut out = io::stdout();
     if args.json {

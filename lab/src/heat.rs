@@ -31,9 +31,9 @@ pub enum Counter {
     Cost,
     /// Triangles tested
     PrimitiveTests,
-    /// Leaves of a tree; cells, empty ones included
+    /// Leaves of a tree entered, or cells, empty ones included
     CellSteps,
-    /// Nodes of a tree; subgrids and levels
+    /// Nodes of a tree entered, or subgrids and levels
     GridSteps,
 }
 

@@ -110,9 +110,9 @@ pub struct Measurement {
     pub hits: u64,
     /// Work of all rays, each traced alone, divided by their number.
     pub primitive_tests_per_ray: f64,
-    /// Leaves of a tree, or cells, empty ones included; likewise.
+    /// Leaves of a tree, or cells, empty ones included, that all rays enter, divided by their number.
     pub cell_steps_per_ray: f64,
-    /// Nodes of a tree, or subgrids and levels; likewise.
+    /// Nodes of a tree, or subgrids and levels, that all rays enter, divided by their number.
     pub grid_steps_per_ray: f64,
     /// The most tests and steps that one ray took.
     pub largest_ray_cost: u64,

@@ -84,7 +84,10 @@ fn results_overwrite_no_mesh() {
     let folder = Folder::new("results").unwrap();
     folder.says("pack a.obj -o blob").unwrap();
     for (words, expected) in [
-        ("--json a.obj procedural:knot:500", "`a.obj` would be a mesh by its name"),
+        (
+            "--json a.obj procedural:knot:500",
+            "`a.obj` is named like a mesh: give --json a name like x.json",
+        ),
         ("blob --json ./blob", "`blob` would be overwritten by its own results"),
         ("a.obj a.obj+blob --json blob", "`blob` would be overwritten by its own results"),
     ] {

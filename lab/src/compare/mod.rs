@@ -96,11 +96,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// Refuses to write results over a mesh: the `--json` of other commands has no file behind it, so a mesh may follow.
+/// Refuses to write results over a mesh. In other commands --json takes no value, so users may type a mesh after it.
 fn check_results(path: &Path, scenes: &[OsString]) -> Result<()> {
     ensure!(
         Format::named(path).is_none(),
-        "`{}` would be a mesh by its name: name a file like x.json behind --json",
+        "`{}` is named like a mesh: give --json a name like x.json",
         path.display()
     );
     for scene in scenes {
@@ -194,8 +194,17 @@ mod tests {
     }
 
     fn compare_of(shown: Shown, workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
-        let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
-        let args = CompareArgs::parse_from(words);
+        measure(&[], shown, workloads, systems).unwrap()
+    }
+
+    fn measure(
+        words: &[&str],
+        shown: Shown,
+        workloads: &[Workload],
+        systems: &[Box<dyn System>],
+    ) -> Result<Comparison> {
+        let scenes = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
+        let args = CompareArgs::parse_from(scenes.iter().chain(words));
         let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
         let plan = Plan {
             repeat: 2,
@@ -204,7 +213,18 @@ mod tests {
             shown,
             first: first::in_this_process,
         };
-        Comparison::measure(&args.scenes, systems, &args.picture, &plan).unwrap()
+        Comparison::measure(&args.scenes, systems, &args.picture, &plan)
+    }
+
+    #[test]
+    fn rays_of_a_camera_that_sees_nothing_are_not_measured() {
+        let away = ["--eye", "0,0,99", "--target", "0,0,199"];
+        let of = |workload| measure(&away, Shown::Mesh, &[workload], &methods(&[Method::Fixed]));
+        for workload in [Workload::Primary, Workload::Ao, Workload::Bounce] {
+            let message = format!("{:#}", of(workload).unwrap_err());
+            assert!(message.contains("no ray hits anything"), "{message}");
+        }
+        of(Workload::Random).unwrap();
     }
 
     #[test]

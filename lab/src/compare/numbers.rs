@@ -4,6 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
+use hgrid_core::INVALID_ID;
 use serde::Serialize;
 
 use super::agreement::is_off;
@@ -21,6 +22,7 @@ use crate::field::Field;
 use crate::machine::Machine;
 use crate::measure::{SceneFacts, ratio};
 use crate::progress::Progress;
+use crate::render::unseen;
 use crate::scene::Scene;
 use crate::table::display_name;
 
@@ -235,7 +237,7 @@ impl SceneNumbers {
     ) -> Result<Self> {
         let mut scene = Scene::load(spec)?;
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
-        let bounds = scene.bounds().context("no vertex with finite coordinates")?;
+        let bounds = scene.whole_bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
         let shown = plan.shown;
         let field = Field::over(&scene, shown.instances());
@@ -244,8 +246,13 @@ impl SceneNumbers {
         }
         let bounds = field.as_ref().map_or(bounds, Field::bounds);
         let tiles = picture.tiles(&scene)?;
+        let reason = unseen(picture, &scene, None);
         let input = Input::of(scene, shown, field.as_ref());
         let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
+        let is_seen = rays.primary_hits.iter().any(|hit| hit.primitive != INVALID_ID);
+        let of_camera = [Workload::Primary, Workload::Ao, Workload::Bounce];
+        let needs_hits = plan.workloads.iter().any(|workload| of_camera.contains(workload));
+        ensure!(is_seen || !needs_hits, reason);
         let first = |system: &dyn System| (plan.first)(spec, shown, system);
         let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);

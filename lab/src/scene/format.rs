@@ -172,9 +172,10 @@ const FOREIGN: [(&[u8], &str); 19] = [
 ];
 
 fn foreign(start: &[u8]) -> Option<&'static str> {
-    // PPM and its like: P, a digit and a white space.
-    if let [b'P', b'1'..=b'6', space, ..] = start
+    // PPM and its like: P, a digit, a white space, then a size or a comment. A binary STL file may begin with any words.
+    if let [b'P', b'1'..=b'6', space, next, ..] = start
         && space.is_ascii_whitespace()
+        && (next.is_ascii_digit() || *next == b'#')
     {
         return Some("a PPM, PGM or PBM picture");
     }
@@ -191,6 +192,7 @@ mod tests {
             (&b"ply\nformat"[..], Some(Format::Obj), Format::Ply),
             (b"glTF\x02\0", None, Format::Gltf),
             (b"solid a", None, Format::Stl),
+            (b"P1 bracket", Some(Format::Stl), Format::Stl),
             (b"{ \"asset\"", None, Format::Gltf),
             (b"v 0 0 0", Some(Format::Obj), Format::Obj),
             (b"", Some(Format::Obj), Format::Obj),

@@ -104,7 +104,7 @@ impl Scene {
     /// Puts this scene in the middle of another, both at their own sizes; pictures show this one.
     fn within(self, outer: Self) -> Self {
         let middle = |scene: &Self| {
-            let (min, max) = scene.bounds().unwrap_or_default();
+            let (min, max) = scene.whole_bounds().unwrap_or_default();
             let at: [f32; 3] = core::array::from_fn(|axis| 0.5 * (min[axis] + max[axis]));
             at
         };
@@ -169,10 +169,17 @@ impl Scene {
         model::bounds(self.positions.iter().copied())
     }
 
+    /// Returns the box around all finite triangles of a file, or around all finite vertices of another scene; `None` if
+    /// there are none.
+    #[must_use]
+    pub fn whole_bounds(&self) -> Option<Bounds> {
+        self.of_triangles.or_else(|| self.bounds())
+    }
+
     /// Returns the box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
     #[must_use]
     pub fn framed_bounds(&self) -> Bounds {
-        self.focus.or(self.of_triangles).or_else(|| self.bounds()).unwrap_or_default()
+        self.focus.or_else(|| self.whole_bounds()).unwrap_or_default()
     }
 }
 
@@ -216,6 +223,12 @@ mod tests {
         for triangle in 0..5000 {
             assert_eq!(joined.triangle(triangle), merged.triangle(triangle));
         }
+        // A vertex that no triangle uses moves nothing.
+        let mut loose = Scene { of_triangles: small.bounds(), ..small.clone() };
+        loose.positions.push([9000.0; 3]);
+        let [at, of_loose] = [small.clone(), loose]
+            .map(|scene| scene.within(small.clone()).positions[0].map(f32::to_bits));
+        assert_eq!(at, of_loose);
         let three = Scene::load(format!("{spec}+procedural:soup:500")).unwrap();
         assert_eq!(three.geometries, [0, 2000, 5000]);
         assert!(small.parts().unwrap().is_empty());

@@ -134,7 +134,7 @@ impl Model {
     }
 }
 
-/// Returns true if scenes take instances with these transforms.
+/// Returns true if these transforms have inverses that a scene takes.
 fn have_inverses(mut transforms: impl Iterator<Item = Transform>) -> bool {
     let config = Config::default();
     let Some(sizes) = Instances::bound(1, &config) else { return false };
