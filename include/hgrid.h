@@ -765,9 +765,10 @@ typedef uint32_t hgrid_verdict;
  * line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
  * however close it starts. An end of the range needs this decision only if it lies between the vertices. The
  * reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may be up to 2^-21 Z
- * outside, and the end of the range is reported; farther outside, nothing is. The reported `t` is rounded, so
- * a range that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
- * its size may be missed. (The source has the proof: core/src/triangle.rs.)
+ * outside, and the end of the range is reported. A triangle whose own `t` lies farther outside is not
+ * reported. The reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that
+ * is farther from the origin than 2^50 times its size may be missed. (The source has the proof:
+ * core/src/triangle.rs.)
  */
 typedef struct hgrid_hit {
     /**
@@ -1338,8 +1339,8 @@ typedef struct hgrid_scene_options {
     /**
      * Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
      * far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
-     * be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
-     * are not shown to it.
+     * be replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
+     * `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
      */
     hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
     /**

@@ -59,9 +59,10 @@ pub struct hgrid_ray {
 /// line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
 /// however close it starts. An end of the range needs this decision only if it lies between the vertices. The
 /// reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may be up to 2^-21 Z
-/// outside, and the end of the range is reported; farther outside, nothing is. The reported `t` is rounded, so
-/// a range that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
-/// its size may be missed. (The source has the proof: core/src/triangle.rs.)
+/// outside, and the end of the range is reported. A triangle whose own `t` lies farther outside is not
+/// reported. The reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that
+/// is farther from the origin than 2^50 times its size may be missed. (The source has the proof:
+/// core/src/triangle.rs.)
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_hit {

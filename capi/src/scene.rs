@@ -123,8 +123,8 @@ pub struct hgrid_scene_options {
     pub context: *mut c_void,
     /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
     /// far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
-    /// be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
-    /// are not shown to it.
+    /// be replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
+    /// `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,

@@ -131,12 +131,13 @@ fn it_is_current() {
     let mut generated = Vec::new();
     builder.generate().expect("cbindgen understands the sources").write(&mut generated);
     let generated = String::from_utf8(generated).expect("text");
-    // C89 has no other comments; cbindgen writes two of these lines itself. The section is for readers of Rust: the head
-    // of the header says it once.
+    // C89 has no other comments; cbindgen writes two of these lines itself. The section is for readers of Rust: the
+    // head of the header says it once.
     let generated = generated
         .replace(" *\n * # Safety\n * Pointers are as the head of this file says.\n", "")
         .replace("// extern \"C\"", "/* extern \"C\" */")
         .replace("// __cplusplus", "/* __cplusplus */");
+    assert!(!generated.contains("# Safety"), "the safety of a function in words of its own");
 
     if std::env::var_os("HGRID_BLESS").is_some() {
         // Replace the file in one step: other tests read it meanwhile.

@@ -290,12 +290,12 @@ pub(super) fn finish(
     Ok(header)
 }
 
-/// [`least_node`] in parts of the scene's extent: 254 steps of 2^-60.
+/// The least extent of a node in parts of the scene's: 254 steps of 2^-60.
 const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
 
-/// The size `least` of a box whose quantisation step is 2^-60 to 2^-59 of the scene's extent. No node has a smaller
-/// step: smaller boxes are quantised as boxes of this size. So a finite number can stand for the inverse of a zero
-/// direction ([`slab`](super::slab)).
+/// The least extent that a node is quantised for, where it is called `least`: smaller boxes count as this large. So no
+/// step is below 2^-60 of the scene's extent, and a finite number can stand for the inverse of a zero direction
+/// ([`slab`](super::slab)).
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
 }

@@ -255,7 +255,7 @@ impl Met {
             (all, enter) = (some & beam.all, beam.enter);
         }
         // Ray by ray, each ray takes one test of all eight boxes. Box by box, each box that the beam left undecided
-        // takes one test for every eight rays.
+        // takes one test for every sixteen rays, which counts as two.
         let unsure = some & !all;
         if count <= octets(mask) * unsure.count_ones() {
             one_by_one(simd, boxes, rays, mask, self);

@@ -32,8 +32,7 @@ const END: f32 = 1023.5;
 const CELL_BITS: u32 = 0x3ff;
 
 impl Keys {
-    /// Keys for boxes whose centres lie in `centers`. Boxes that are one point all get the same
-    /// key.
+    /// Keys for boxes whose centres lie in `centers`. If that is a single point or empty, all boxes get the same key.
     pub(crate) fn new(centers: &Aabb) -> Self {
         let extent = centers.size().max_element();
         // Keep it finite: zero times infinity is a NaN.

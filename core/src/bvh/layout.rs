@@ -31,8 +31,8 @@
 //! index       = 128 + 4 n + 80 nodes, and paddings of at most 60 and 48
 //!            <= 15.8 n + 636                        n < 4097: one late root, for which 11 / 7 is rounded down to 1
 //!            <= 15.96 n + 682 <= 16 n + 640         otherwise
-//! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 63; one bin, or 16 triangles or more a bin
-//!            <= 16.5 n + 254
+//! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 60; one bin, or 16 triangles or more a bin
+//!            <= 16.5 n + 248
 //! ```
 
 use crate::arena::section_bytes;

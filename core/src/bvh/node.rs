@@ -222,7 +222,7 @@ impl Node {
         }
     }
 
-    /// Sets origin and steps so that bounds can hold a box, and one of size `least`.
+    /// Sets origin and steps so that bounds can hold a box, enlarged to `least` on axes where it is smaller.
     fn frame(&mut self, bounds: &Aabb, least: f32) {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut exponents = [0; 4];

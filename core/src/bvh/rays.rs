@@ -475,8 +475,8 @@ impl Rays {
     }
 }
 
-/// Returns a distance behind all hits that have this `t`. They may lie farther away than it says: it is rounded, and it
-/// is off by up to a share of the corners' range ([`slab`](super::slab)).
+/// Returns a distance behind all hits that have this `t`. A hit may lie farther away than its `t`, which is rounded and
+/// off by a share of the corners' range ([`slab`](super::slab)).
 #[inline(always)]
 fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
     let (end, growth) = (t * scale, growth_of_range(extent, scale));

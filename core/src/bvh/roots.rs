@@ -4,7 +4,7 @@
 //! ```text
 //! for each unit (a crowded bin, or bins side by side that make up a root):
 //!     crowded: new keys in the box around its centres, new bins; then their units
-//!     else:    sort by key, split where high bits of the key change, make a subtree of each part
+//!     else:    sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
 //! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
@@ -125,8 +125,8 @@ impl Roots<'_> {
         self.cut(range);
     }
 
-    /// Makes roots of sorted entries: splits them where the highest bit of their keys changes, until parts are small
-    /// enough.
+    /// Makes roots of sorted entries. Splits them where the highest bit changes in which their keys differ, or in the
+    /// middle if all are equal, until parts are small enough; none is smaller than a piece.
     fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {

@@ -48,8 +48,7 @@ impl RootItem {
         Vec3A::from_array(self.min) + Vec3A::from_array(self.max)
     }
 
-    /// The cost of entering it: its triangles, in fours. A factor changes no cut, so the four decides only how costs
-    /// are rounded: items of up to four triangles cost the same.
+    /// The cost of entering it: its number of triangles divided by four, rounded up.
     #[inline(always)]
     fn cost(&self) -> f32 {
         as_cost(self.count)

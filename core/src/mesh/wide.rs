@@ -1,7 +1,7 @@
 //! Reads many triangles fast: sixteen bytes a vertex.
 //!
 //! ```text
-//! x y z and the four bytes behind them, whatever they are: one check and one load, not three
+//! x y z and the four bytes behind them, whatever they are: one check and one load a vertex, not three
 //! ```
 //!
 //! The last vertex may have nothing behind it, and 16-bit indices are not read here: such triangles take the

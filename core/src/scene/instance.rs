@@ -283,8 +283,8 @@ impl ObjectRay {
     }
 
     /// The `t` of the object's ray up to which hits matter, once the scene's ray has a hit at `t`. It is no less than
-    /// that of any hit in the object that has the same `t` in the scene: such a hit comes before the next `t`, and its
-    /// own is a number in f32, so rounding does not put the end before it.
+    /// that of any hit in the object that has the same `t` in the scene. Such a hit lies below the next f32 after `t`.
+    /// Its `t` in the object is an f32, and rounding keeps order: so the rounded end is not below it.
     ///
     /// For triangles it must not end the range of `inside`, the object's ray, because the exact place of a hit decides
     /// about the range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.

@@ -71,8 +71,8 @@ pub struct SceneOptions<'q> {
     pub cull: Cull,
     /// Decides whether a hit counts. Within an instance it is asked from near to far and about each triangle at most
     /// once; instances come roughly front to back, so a hit that it accepts may still be replaced by a closer one of
-    /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it:
-    /// their test decides.
+    /// another instance. What lies behind a hit that it accepted is not shown to it. [`Verdict::AcceptAndStop`] is
+    /// the same as [`Verdict::Accept`]. Shapes are not shown to it: their test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
     /// Counters that add up the work: an instance that is offered is a primitive test. With counters or a filter, the
     /// rays of a batch are traced one by one.
