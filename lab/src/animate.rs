@@ -77,13 +77,9 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let cannot = || format!("cannot animate `{name}`");
     let (report, hits) = animate(&scene, &plan, write, &mut progress).with_context(cannot)?;
     drop(progress);
-    ensure!(
-        hits > 0,
-        "{}: {}{}",
-        cannot(),
-        unseen(&args.picture, &scene, None),
-        args.output.as_ref().map(|_| ". The pictures that it wrote are empty").unwrap_or_default()
-    );
+    let note =
+        if args.output.is_some() { ". The pictures that were written are empty" } else { "" };
+    ensure!(hits > 0, "{}: {}{note}", cannot(), unseen(&args.picture, &scene, None));
 
     let mut out = io::stdout();
     if args.json {
@@ -163,11 +159,9 @@ impl fmt::Display for Report {
         if *instances > 0 {
             write!(f, "{}, ", counted(*instances, "instance", "instances"))?;
         }
-        let (refitted, plural) = (
-            if self.is_refitted { ", refitted" } else { "" },
-            if *threads == 1 { "" } else { "s" },
-        );
-        writeln!(f, "{method}{refitted}, {size} x {size} pixels, {threads} thread{plural}\n")?;
+        let refitted = if self.is_refitted { ", refitted" } else { "" };
+        let threads = counted(*threads, "thread", "threads");
+        writeln!(f, "{method}{refitted}, {size} x {size} pixels, {threads}\n")?;
         writeln!(
             f,
             "{:>6}  {:>10}  {:>10}  {:>11}  {:>10}",

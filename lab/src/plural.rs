@@ -2,10 +2,15 @@
 
 use indicatif::HumanCount;
 
-/// Returns a count with its noun in the singular or the plural.
+/// Returns the noun for a count: the singular or the plural.
+pub(crate) fn noun<'n>(count: impl TryInto<u64>, one: &'n str, many: &'n str) -> &'n str {
+    if count.try_into().is_ok_and(|count| count == 1) { one } else { many }
+}
+
+/// Returns a count with its noun.
 pub(crate) fn counted(count: impl TryInto<u64>, one: &str, many: &str) -> String {
     let count = count.try_into().unwrap_or(u64::MAX);
-    format!("{} {}", HumanCount(count), if count == 1 { one } else { many })
+    format!("{} {}", HumanCount(count), noun(count, one, many))
 }
 
 /// Returns a count of triangles.

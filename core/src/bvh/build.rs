@@ -462,7 +462,7 @@ impl BuildInputs<'_> {
                 if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
             let nodes = take_up_to(&mut rest_of_nodes, room);
             let room_to_sort = if is_last { spare.len() } else { count };
-            let spare = take_up_to(&mut spare, room_to_sort);
+            let spare = take(&mut spare, room_to_sort);
             let range = start..end;
             let part = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
             start = end;

@@ -282,9 +282,10 @@ impl ObjectRay {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// The `t` of the object's ray up to which hits matter, once the scene's ray has a hit at `t`. It is no less than
-    /// that of any hit in the object that has the same `t` in the scene. Such a hit lies below the next f32 after `t`.
-    /// Its `t` in the object is an f32, and rounding keeps order: so the rounded end is not below it.
+    /// The `t` of the object's ray up to which hits matter, once the scene's ray has a hit at `t`. The function moves
+    /// the next f32 after `t` into the object and rounds it. A hit in the object that has the same `t` in the scene
+    /// lies before that place, and its own `t` is an f32. Rounding keeps the order of numbers, so the result is never
+    /// less than the `t` of such a hit.
     ///
     /// For triangles it must not end the range of `inside`, the object's ray, because the exact place of a hit decides
     /// about the range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.

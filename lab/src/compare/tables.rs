@@ -8,6 +8,7 @@ use super::ratios::Ratio;
 use super::shown::Shown;
 use super::workloads::{AO_REACH, Workload};
 use crate::measure::ratio;
+use crate::plural::noun;
 use crate::table::{count, display_name, markdown as as_markdown, seconds, times};
 
 /// The mark after a time whose rays have too many differing answers.
@@ -113,15 +114,17 @@ impl SceneNumbers {
         };
         let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
         let (name, triangles) = (display_name(&self.facts.scene), count(self.facts.triangles));
-        let s = |count: usize| if count == 1 { "" } else { "s" };
-        let of_triangles = s(self.facts.triangles);
+        let of_triangles = noun(self.facts.triangles, "triangle", "triangles");
         let shown = match self.shown {
-            Shown::Mesh => format!("{triangles} triangle{of_triangles}"),
+            Shown::Mesh => format!("{triangles} {of_triangles}"),
             Shown::Instances(instances) => {
-                let (number, of_instances) = (count(instances as usize), s(instances as usize));
-                format!("{number} instance{of_instances} of {triangles} triangle{of_triangles}")
+                let of_instances = noun(instances, "instance", "instances");
+                let instances = count(instances as usize);
+                format!("{instances} {of_instances} of {triangles} {of_triangles}")
             }
-            Shown::Spheres => format!("{triangles} sphere{of_triangles}"),
+            Shown::Spheres => {
+                format!("{triangles} {}", noun(self.facts.triangles, "sphere", "spheres"))
+            }
         };
         format!("{name}: {shown}, hits: {}", hits.join(", "))
     }

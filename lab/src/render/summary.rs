@@ -79,7 +79,7 @@ impl fmt::Display for Summary {
         }
         writeln!(f, ", loaded in {loaded}")?;
 
-        let s = if *threads == 1 { "" } else { "s" };
+        let threads = counted(*threads, "thread", "threads");
         let bytes = HumanCount(self.index_bytes as u64);
         let each = ratio(self.index_bytes as u64, scene.triangles as u64);
         let built = seconds(self.build_seconds);
@@ -102,7 +102,7 @@ impl fmt::Display for Summary {
             (false, _) => f.write_str(", ambient occlusion")?,
         }
         let (rays, rendered) = (counted(self.rays, "ray", "rays"), seconds(self.render_seconds));
-        write!(f, "; {rays} in {rendered} on {threads} thread{s}")?;
+        write!(f, "; {rays} in {rendered} on {threads}")?;
         if let Some(Work {
             primitive_tests_per_ray: tests,
             cell_steps_per_ray: cells,

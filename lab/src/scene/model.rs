@@ -141,7 +141,7 @@ fn have_inverses(mut transforms: impl Iterator<Item = Transform>) -> bool {
     let [mut index, mut scratch] = [sizes.index_bytes, sizes.scratch_bytes]
         .map(|bytes| vec![Block::ZERO; Block::count_for(bytes)]);
     let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    // Whether an instance is taken depends on no other one.
+    // A scene takes or refuses each instance by itself, so one at a time is enough.
     transforms.all(|transform| {
         let instance = Instance::with_transform(0, transform);
         Instances::build(&[instance], &[Object::Nothing], &config, index, scratch).is_ok()
