@@ -10,7 +10,7 @@
 use super::Bvh;
 use super::nearest::ClosestSearch;
 use super::slab::Slab;
-use super::walk::OneRay;
+use super::walk::{FIRST_STACK, OneRay, StackEntry, Walk, Walked};
 use crate::aabb::Aabb;
 use crate::approach::{Approach, LineF64};
 use crate::counters::{Counters, Tally};
@@ -110,15 +110,18 @@ impl Bvh<'_> {
         tally: &mut T,
     ) -> bool {
         let Scope { mesh, bounds, simd } = scope;
-        self.with_stack(
-            #[inline(always)]
-            |stack| {
-                let bvh = self;
-                let mut ray =
-                    OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, stack };
-                dispatch(*simd, &mut ray)
-            },
-        )
+        let bvh = self;
+        let one =
+            &mut OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume: None };
+        let mut stack = [0; FIRST_STACK];
+        match walk_on(one, *simd, &mut stack) {
+            Walked::Through => true,
+            Walked::Not => false,
+            Walked::Full => {
+                walk_deep(one, *simd, &stack);
+                true
+            }
+        }
     }
 
     /// Passes `test` the triangles that may lie within a distance of a point, roughly nearest first. `test` returns the
@@ -142,5 +145,96 @@ impl Bvh<'_> {
                 dispatch(*simd, &mut nearest);
             },
         );
+    }
+}
+
+/// Begins or resumes a walk. Out of line, so that a program has its code once.
+#[inline(never)]
+fn walk_on<F: Search, T: Tally>(
+    one: &mut OneRay<'_, F, T>,
+    simd: SimdLevel,
+    stack: &mut [StackEntry],
+) -> Walked {
+    dispatch(simd, &mut Walk { one, stack })
+}
+
+/// Resumes a walk with a stack that is large enough for the tree.
+#[cold]
+#[inline(never)]
+fn walk_deep<F: Search, T: Tally>(
+    one: &mut OneRay<'_, F, T>,
+    simd: SimdLevel,
+    begun: &[StackEntry; FIRST_STACK],
+) {
+    one.bvh.with_stack(|stack| {
+        if let Some(first) = stack.first_chunk_mut() {
+            *first = *begun;
+        }
+        walk_on(one, simd, stack);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::arena::Block;
+    use crate::bvh::walk::STACK;
+    use crate::config::Config;
+    use crate::grid::Grid;
+    use crate::random::point;
+    use crate::ray::Hit;
+    use crate::search::One;
+
+    #[test]
+    fn a_walk_resumes_where_its_stack_was_full() {
+        let mut state = 1;
+        // Long triangles: their boxes overlap, so many children of a node are met.
+        let count = if cfg!(miri) { 60 } else { 6000 };
+        let positions: Vec<_> = (0..3 * count).map(|_| point(&mut state).to_array()).collect();
+        let indices: Vec<_> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let mut memory = [(); 2].map(|()| vec![Block::ZERO; 20_000]);
+        let [index, scratch] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+        let grid = Grid::build(mesh, &Config::default(), index, scratch).unwrap();
+        let (scope, bvh) = (grid.scope(), grid.tree().unwrap());
+
+        let mut most = 0;
+        for _ in 0..if cfg!(miri) { 3 } else { 300 } {
+            let ray = &Ray::new(point(&mut state).to_array(), point(&mut state).to_array());
+            // Make room for one child more each time that the stack is full.
+            let walk = |room: usize| {
+                let mut one = One { hit: Hit::MISS, is_any: false };
+                let mut counters = Counters::default();
+                let mut walk = OneRay {
+                    bvh,
+                    mesh: scope.mesh,
+                    ray,
+                    part: [0.0, f32::INFINITY],
+                    cull: Cull::None,
+                    bounds: &scope.bounds,
+                    afar: None,
+                    search: &mut one,
+                    tally: &mut counters,
+                    resume: None,
+                };
+                let mut stack = vec![0; room];
+                let mut resumed = 0;
+                while walk_on(&mut walk, scope.simd, &mut stack) == Walked::Full {
+                    stack.push(0);
+                    resumed += 1;
+                }
+                (one.hit, counters, resumed)
+            };
+            let (hit, counters, resumed) = walk(7);
+            let (expected, expected_counters, none) = walk(STACK);
+            assert_eq!((hit, counters, none), (expected, expected_counters, 0), "{ray:?}");
+            assert_eq!(grid.intersect(ray).unwrap_or(Hit::MISS), expected);
+            most = most.max(resumed);
+        }
+        // Some rays of queries are resumed, too.
+        assert!(cfg!(miri) || 7 + most > FIRST_STACK, "{most}");
     }
 }

@@ -23,6 +23,8 @@
 //! The direction is scaled by a power of two so that its largest component lies between 1 and 2, and the
 //! range of the ray with it: distances are about those of the scene, whatever the direction's length.
 
+use glam::Vec3A;
+
 use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::{Approach, FAR_EXTENTS};
 use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
@@ -60,10 +62,10 @@ pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slab {
     /// Start of the ray, moved by the slack so that near sides come nearer and far ones go farther.
-    pub(crate) origin_near: [f32; 3],
-    pub(crate) origin_far: [f32; 3],
+    pub(crate) origin_near: Vec3A,
+    pub(crate) origin_far: Vec3A,
     /// One over the scaled direction.
-    pub(crate) inverse: [f32; 3],
+    pub(crate) inverse: Vec3A,
     /// The range in which boxes matter.
     pub(crate) start: f32,
     pub(crate) end: f32,
@@ -85,48 +87,38 @@ impl Slab {
         [begin, until]: [f32; 2],
         bounds: &Aabb,
     ) -> Option<(Self, RayFilter)> {
-        let [x, y, z] = ray.direction;
-        let longest = greater(x.abs(), greater(y.abs(), z.abs()));
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let longest = direction.abs().max_element();
         let size = bounds.size();
-        let center = ((bounds.min + bounds.max) * 0.5).to_array();
-        let [a, b, c] = ray.origin;
-        let away = |at: f32, axis: usize| (at - center[axis]).abs();
-        let (a, b, c) = (away(a, 0), away(b, 1), away(c, 2));
-        let limit = FAR_EXTENTS * size.max_element();
-        let is_near = a <= limit && b <= limit && c <= limit;
+        let extent = size.max_element();
+        let away = (origin - (bounds.min + bounds.max) * 0.5).abs();
+        let is_near = away.cmple(Vec3A::splat(FAR_EXTENTS * extent)).all();
         let is_ray = longest > NEARBY_SHORT && longest < NEARBY_LONG && begin <= until;
         // A NaN may hide beside the longest component.
-        let is_number = x + y + z <= f32::MAX;
+        let is_number = direction.element_sum() <= f32::MAX;
         if !(is_near && is_ray && is_number) {
             return None;
         }
         let exponent = longest.to_bits() & 0x7f80_0000;
         let scale = f32::from_bits(exponent);
         let inverse_scale = f32::from_bits(0x7f00_0000 - exponent);
-        let direction = [x * inverse_scale, y * inverse_scale, z * inverse_scale];
-        let inverse = |d: f32| {
-            let inverse = scale / d;
-            if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
-        };
-        let inverse = [inverse(x), inverse(y), inverse(z)];
+        let inverse = Vec3A::splat(scale) / direction;
+        let steep = Vec3A::splat(STEEP);
+        let inverse = Vec3A::select(inverse.abs().cmple(steep), inverse, steep.copysign(direction));
+        let direction = direction * inverse_scale;
         // Widen the range: a t stands for all numbers that round to it, a tiny one for all below 2^-149. No product may
         // be denormal unless the ray is: some processors take 70 cycles for it. Use `max`, not `if`: an `if` becomes a
         // select, and the product that is not selected is computed, too.
         let start = lesser(begin * scale, f32::MAX);
         let end = greater(until * scale, -f32::MAX);
-        let extent = size.max_element();
         let growth = growth_of_range(extent, scale);
-        let half = (size * 0.5).to_array();
-        let distance = greater(a + half[0], greater(b + half[1], c + half[2]));
+        let distance = (away + size * 0.5).max_element();
         // Hits that lie behind the origin are those of a negative `t_min`, wherever this walk begins.
-        let has_behind = ray.t_min < 0.0;
-        let near = |axis: usize| {
-            let at = ray.origin[axis];
-            if has_behind { moved(at, behind(distance).copysign(inverse[axis])) } else { at }
-        };
+        let origin_near =
+            if ray.t_min < 0.0 { moved_back(origin, behind(distance), inverse) } else { origin };
         let slab = Self {
-            origin_near: [near(0), near(1), near(2)],
-            origin_far: ray.origin,
+            origin_near,
+            origin_far: origin,
             inverse,
             start: start - (start.abs() * EARLIER + growth),
             end: end + (end.abs() * (WIDER - 1.0) + growth),
@@ -135,8 +127,8 @@ impl Slab {
             nearby: scale,
             growth,
         };
-        let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
-        let filter = RayFilter::nearby(ray.origin, direction, sum, distance, extent);
+        let sum = direction.abs().element_sum();
+        let filter = RayFilter::nearby(ray.origin, direction.to_array(), sum, distance, extent);
         Some((slab, filter))
     }
 
@@ -152,13 +144,12 @@ impl Slab {
             let inverse = round(scale / f64::from(d));
             if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
         };
-        let inverse = [inverse(x), inverse(y), inverse(z)];
+        let inverse = Vec3A::new(inverse(x), inverse(y), inverse(z));
         let slack = approach.slack + behind(round(approach.reach.distance));
-        let near = |axis: usize| moved(approach.anchor[axis], slack.copysign(inverse[axis]));
-        let far = |axis: usize| moved(approach.anchor[axis], -slack.copysign(inverse[axis]));
+        let anchor = Vec3A::from(approach.anchor);
         let mut slab = Self {
-            origin_near: [near(0), near(1), near(2)],
-            origin_far: [far(0), far(1), far(2)],
+            origin_near: moved_back(anchor, slack, inverse),
+            origin_far: moved_back(anchor, slack, -inverse),
             inverse,
             start: 0.0,
             end: 0.0,
@@ -205,13 +196,18 @@ impl Slab {
 
     /// The inverse direction for far sides.
     #[inline(always)]
-    pub(crate) fn inverse_far(&self) -> [f32; 3] {
-        self.inverse.map(|inverse| inverse * WIDER)
+    pub(crate) fn inverse_far(&self) -> Vec3A {
+        self.inverse * WIDER
     }
 }
 
-/// Moves a coordinate by at least an amount, however it is rounded.
-#[inline(always)]
-fn moved(at: f32, by: f32) -> f32 {
-    if by.is_sign_positive() { (at + by).next_up() } else { (at + by).next_down() }
+/// Moves a point against a direction by at least an amount on each axis, however it is rounded.
+#[cold]
+#[inline(never)]
+fn moved_back(point: Vec3A, by: f32, inverse: Vec3A) -> Vec3A {
+    let moved = |axis: usize| {
+        let (at, by) = (point[axis], by.copysign(inverse[axis]));
+        if by.is_sign_positive() { (at + by).next_up() } else { (at + by).next_down() }
+    };
+    Vec3A::new(moved(0), moved(1), moved(2))
 }

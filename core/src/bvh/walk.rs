@@ -8,6 +8,13 @@
 //!               a hit ends the ray there
 //!       pop the next child that the ray enters before its end
 //! ```
+//!
+//! Two things cost a ray more than its arithmetic. A child's place follows from the boxes of its node, so one node
+//! waits for the other: [`predicted`] hands the place to the branch predictor. And a stack for the deepest tree
+//! takes as long to zero as a node to test: a ray begins on a short one, and [resumes](Resume) on a larger one if that
+//! is full.
+
+use core::hint::black_box;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
@@ -22,7 +29,7 @@ use crate::aabb::{Aabb, greater, lesser};
 use crate::counters::Tally;
 use crate::eight::Eight;
 use crate::extremes::Extremes;
-use crate::filter::{LineFilter, RayFilter};
+use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::Ray;
@@ -30,10 +37,14 @@ use crate::search::{Outcome, Search};
 use crate::simd::{HAS_VECTORS, Kernel};
 use crate::triangle::TriangleTest;
 
+/// Places on the first stack of a ray. It is short, because every query zeroes it; the few rays that need more places
+/// go on with a larger stack.
+pub(crate) const FIRST_STACK: usize = 32;
+
 /// Places on the stack of a ray: seven a level, and one.
 pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
 
-/// The most levels of a tree that uses the small stack, as nearly all do: every query zeroes its stack first.
+/// The most levels of a tree for which the small stack is large enough, as it is for nearly all.
 pub(crate) const FEW_LEVELS: u32 = 14;
 /// Places on a small stack.
 pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
@@ -57,7 +68,38 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
-    pub(crate) stack: &'r mut [StackEntry],
+    /// Where the walk goes on; `None` at its begin.
+    pub(crate) resume: Option<Resume>,
+}
+
+/// A ray and its stack.
+pub(crate) struct Walk<'w, 'r, F, T> {
+    pub(crate) one: &'w mut OneRay<'r, F, T>,
+    pub(crate) stack: &'w mut [StackEntry],
+}
+
+/// Where a walk goes on that had no more room on its stack.
+#[derive(Clone, Copy)]
+pub(crate) struct Resume {
+    /// The next node.
+    number: u32,
+    /// Children on the stack.
+    top: usize,
+    /// The end of the ray.
+    end: f32,
+    /// Nodes and leaves that it may still enter.
+    budget: usize,
+}
+
+/// How a walk ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Walked {
+    /// The ray has passed the tree, or the search is over.
+    Through,
+    /// [`Slab::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed.
+    Not,
+    /// The stack has no room for the children of a node. The walk may go on with a larger one.
+    Full,
 }
 
 /// The ray in vectors.
@@ -68,7 +110,7 @@ struct Wide<S: Simd> {
     inverse_near: [f32x8<S>; 3],
     inverse_far: [f32x8<S>; 3],
     start: f32x8<S>,
-    filter: LineFilter<f32x8<S>>,
+    filter: RayFilter,
 }
 
 /// The near side on each axis: 0 for the low side, [`FLIP`] for the high side.
@@ -76,19 +118,16 @@ pub(super) type NearSides = [usize; 3];
 /// The distance in rows of [`Node::bounds`] from the low side of an axis to its high side. XOR with it swaps the sides.
 const FLIP: usize = 3;
 
-/// All boxes of a node, as bits.
-const ALL: u32 = (1 << WIDTH) - 1;
-
 impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn new(simd: S, slab: &Slab, filter: &RayFilter) -> Self {
         Self {
-            origin_near: splat(simd, slab.origin_near),
-            origin_far: splat(simd, slab.origin_far),
-            inverse_near: splat(simd, slab.inverse),
-            inverse_far: splat(simd, slab.inverse_far()),
+            origin_near: splat(simd, slab.origin_near.to_array()),
+            origin_far: splat(simd, slab.origin_far.to_array()),
+            inverse_near: splat(simd, slab.inverse.to_array()),
+            inverse_far: splat(simd, slab.inverse_far().to_array()),
             start: f32x8::splat(simd, slab.start),
-            filter: filter.splat(simd),
+            filter: *filter,
         }
     }
 
@@ -104,12 +143,12 @@ impl<S: Simd> Wide<S> {
     ) -> u32 {
         let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        let dropped = self.filter.drops(&triangles.corners).to_bitmask() as u32;
+        let dropped = self.filter.splat(simd).drops(&triangles.corners).to_bitmask() as u32;
         !dropped & triangles.used
     }
 
-    /// Intersects the ray with the boxes of a node. Returns a mask of those that it does not enter before its end, and
-    /// the entry distances.
+    /// Intersects the ray with the boxes of a node. Returns a mask of those that it enters before its end, and the
+    /// entry distances.
     #[inline(always)]
     fn meet(&self, simd: S, node: &Node, flips: NearSides, end: f32) -> (u32, f32x8<S>) {
         // Splat integers: floats would be loaded into one lane first and then broadcast.
@@ -129,7 +168,7 @@ impl<S: Simd> Wide<S> {
         let [x, y, z] = distances;
         let near = x.0.greater(y.0).greater(z.0.greater(self.start));
         let far = x.1.lesser(y.1).lesser(z.1.lesser(f32x8::splat(simd, end)));
-        (bits(near.simd_gt(far)), near)
+        (bits(!near.simd_gt(far)), near)
     }
 }
 
@@ -164,10 +203,77 @@ impl<S: Simd> Wide<S> {
     }
 }
 
+/// Pushes the children of a node that a ray meets but the nearest, and returns its slot.
+#[inline(always)]
+fn push_others<S: Simd>(
+    stack: &mut [StackEntry],
+    top: &mut usize,
+    node: u32,
+    met: u32,
+    near: f32x8<S>,
+) -> u32 {
+    let first = met.trailing_zeros();
+    let others = met & met.wrapping_sub(1);
+    if others == 0 {
+        return predicted(first);
+    }
+    let near: [u32; WIDTH] = near.bitcast::<u32x8<S>>().into();
+    let bits_at = |slot: u32| near[slot as usize % WIDTH];
+    let at = |slot: u32| f32::from_bits(bits_at(slot));
+    let second = others.trailing_zeros();
+    let mut rest = others & (others - 1);
+    let base = *top;
+    if rest == 0 {
+        // Branch: a select would wait for both distances.
+        return if at(second) < at(first) {
+            push(stack, top, base, node, first, bits_at(first));
+            predicted(second)
+        } else {
+            push(stack, top, base, node, second, bits_at(second));
+            predicted(first)
+        };
+    }
+    let (mut nearest, mut other) = (first, second);
+    if at(second) < at(first) {
+        (nearest, other) = (second, first);
+    }
+    push(stack, top, base, node, other, bits_at(other));
+    while rest != 0 {
+        let mut slot = rest.trailing_zeros();
+        rest &= rest - 1;
+        if at(slot) < at(nearest) {
+            core::mem::swap(&mut slot, &mut nearest);
+        }
+        push(stack, top, base, node, slot, bits_at(slot));
+    }
+    predicted(nearest)
+}
+
+/// Returns a slot by way of a jump, not as a number: the processor predicts the jump, and intersects the child's boxes
+/// while it still waits for this node's. Rays that run side by side mostly take the same way; rays that have nothing
+/// in common lose a little.
+#[inline(always)]
+fn predicted(slot: u32) -> u32 {
+    if !HAS_VECTORS {
+        return slot;
+    }
+    // Hide the numbers from the compiler: it would see that the jump changes nothing.
+    match slot {
+        0 => black_box(0),
+        1 => black_box(1),
+        2 => black_box(2),
+        3 => black_box(3),
+        4 => black_box(4),
+        5 => black_box(5),
+        6 => black_box(6),
+        _ => black_box(7),
+    }
+}
+
 /// Finds the near side on each axis.
 #[inline(always)]
 pub(super) fn flips_of(slab: &Slab) -> NearSides {
-    slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
+    slab.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
 /// Does the same as [`Wide::meet`] box by box, for machines without vectors.
@@ -175,7 +281,7 @@ pub(super) fn flips_of(slab: &Slab) -> NearSides {
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
     let flips = flips_of(slab);
     let (origin, steps, inverse_far) = (node.origin(), node.steps(), slab.inverse_far());
-    let (mut missed, mut nearest) = (0, [0.0; WIDTH]);
+    let (mut met, mut nearest) = (0, [0.0; WIDTH]);
     for (slot, nearest) in nearest.iter_mut().enumerate() {
         let (mut near, mut far) = (slab.start, end);
         for axis in 0..3 {
@@ -188,9 +294,10 @@ fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>)
             far = lesser(far_side * inverse_far[axis], far);
         }
         *nearest = near;
-        missed |= u32::from(near > far) << slot;
+        let is_missed = near > far;
+        met |= u32::from(!is_missed) << slot;
     }
-    (missed, f32x8::simd_from(simd, nearest))
+    (met, f32x8::simd_from(simd, nearest))
 }
 
 /// A side of eight boxes as numbers.
@@ -221,16 +328,16 @@ fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
     low.combine(high).bitcast::<i32x8<S>>().to_float()
 }
 
-impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
-    /// False if [`Slab::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed then.
-    type Output = bool;
+impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
+    type Output = Walked;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> bool {
-        let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, stack } = self;
+    fn run<S: Simd>(self, simd: S) -> Walked {
+        let Walk { one, stack } = self;
+        let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume } = one;
         let (part, cull, afar) = (*part, *cull, *afar);
         let nearby = if afar.is_none() { Slab::nearby(ray, part, bounds) } else { afar.copied() };
-        let Some((slab, filter)) = nearby else { return false };
+        let Some((slab, filter)) = nearby else { return Walked::Not };
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
@@ -240,83 +347,49 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             #[inline(always)]
             || Wide::new(simd, slab, &filter),
         );
-        let wide = wide.as_ref().map(core::hint::black_box);
+        let wide = wide.as_ref().map(black_box);
         let flips = flips_of(slab);
-        let (mut end, mut top) = (slab.end, 0);
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
-        let mut budget = bvh.budget();
-        let mut child = Child::Inner(0);
+        let start = Resume { number: 0, top: 0, end: slab.end, budget: bvh.budget() };
+        let Resume { number, mut top, mut end, mut budget } = resume.unwrap_or(start);
+        let mut child = Child::Inner(number);
         loop {
             while let Child::Inner(number) = child {
+                if top + (WIDTH - 1) > stack.len() {
+                    *resume = Some(Resume { number, top, end, budget });
+                    return Walked::Full;
+                }
                 tally.grid_step();
                 let node = bvh.nodes.get(number as usize);
                 let rest = budget.checked_sub(1);
-                let (Some(node), Some(rest)) = (node, rest) else { return true };
+                let (Some(node), Some(rest)) = (node, rest) else { return Walked::Through };
                 budget = rest;
                 // Intersect the ray with the eight boxes of the node.
-                let (missed, near) = match wide {
+                let (met, near) = match wide {
                     Some(ray) => ray.meet(simd, node, flips, end),
                     None => meet(simd, slab, node, end),
                 };
-                if missed == ALL {
+                if met == 0 {
                     // Pop the next child.
-                    let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
+                    let Some(next) = pop(bvh, stack, &mut top, end) else { return Walked::Through };
                     child = next;
                     continue;
                 }
-                // At least one box is met, so the lowest set bit is one of the eight.
-                let first = (!missed).trailing_zeros();
-                let others = !missed & (!missed - 1) & ALL;
-                if others == 0 {
-                    // Descend into the only one.
-                    child = node.child(first);
-                    continue;
-                }
                 // Descend into the nearest, push the others.
-                let near: [u32; WIDTH] = near.bitcast::<u32x8<S>>().into();
-                let bits_at = |slot: u32| near[slot as usize % WIDTH];
-                let at = |slot: u32| f32::from_bits(bits_at(slot));
-                let second = others.trailing_zeros();
-                let mut rest = others & (others - 1);
-                let base = top;
-                if rest == 0 {
-                    // Branch: a select would wait for both distances.
-                    if at(second) < at(first) {
-                        push(stack, &mut top, base, number, first, bits_at(first));
-                        child = node.child(second);
-                    } else {
-                        push(stack, &mut top, base, number, second, bits_at(second));
-                        child = node.child(first);
-                    }
-                    continue;
-                }
-                let (mut nearest, mut other) = (first, second);
-                if at(second) < at(first) {
-                    (nearest, other) = (second, first);
-                }
-                push(stack, &mut top, base, number, other, bits_at(other));
-                while rest != 0 {
-                    let mut slot = rest.trailing_zeros();
-                    rest &= rest - 1;
-                    if at(slot) < at(nearest) {
-                        core::mem::swap(&mut slot, &mut nearest);
-                    }
-                    push(stack, &mut top, base, number, slot, bits_at(slot));
-                }
-                child = node.child(nearest);
+                child = node.child(push_others(stack, &mut top, number, met, near));
             }
 
             // Filter the triangles of a leaf, all eight together. Decide those that pass one by one in f64.
             let Child::Leaf { first, count } = child else { continue };
             let ids = bvh.leaf(first, count);
-            let Some(rest) = budget.checked_sub(1) else { return true };
+            let Some(rest) = budget.checked_sub(1) else { return Walked::Through };
             budget = rest;
             tally.cell_step();
             tally.primitive_tests(ids.len());
             if F::OF_BOXES
                 && offer_leaf(simd, wide, slab, mesh, ids, flips, bounds, &mut end, *search)
             {
-                return true;
+                return Walked::Through;
             }
             let mut survivors = match wide {
                 _ if F::OF_BOXES => 0,
@@ -333,10 +406,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 match search.decided(TriangleTest::decide_for(ray, cull, mesh, id)) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => end = slab.latest(t),
-                    Outcome::Done => return true,
+                    Outcome::Done => return Walked::Through,
                 }
             }
-            let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
+            let Some(next) = pop(bvh, stack, &mut top, end) else { return Walked::Through };
             child = next;
         }
     }
