@@ -166,6 +166,10 @@
  * empty mesh builds and is never hit, and a triangle with a NaN or infinite vertex is left out and
  * counted, unless HGRID_BUILD_STRICT says otherwise.
  *
+ * Queries of one ray or point that return no status answer with a miss if the options break the rules, and so
+ * does every query of one ray for a ray of zeros. A debug build of the library (docs/c.md) stops the program at
+ * both: it writes to stderr what is wrong and calls abort(); without an operating system it loops.
+ *
  * Threads
  * -------
  * The library waits for no lock and starts no thread (hgrid_build uses yours if you bring some), and
@@ -721,7 +725,8 @@ typedef struct hgrid_grid {
  * A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
  * `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
  * with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
- * `t_min > t_max` hits nothing.
+ * `t_min > t_max` hits nothing. A query of one ray stops a debug build of the library if all bytes of the ray are 0:
+ * then nobody has written it.
  */
 typedef struct hgrid_ray {
     /**
@@ -815,8 +820,8 @@ typedef struct hgrid_counters {
  * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
  * with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
  * one by one.
- * With options that break the rules for structs, a query of one ray returns a miss;
- * `hgrid_intersect_all` with the same options returns the error.
+ * With options that break the rules for structs, a query of one ray returns a miss, and stops a debug build of the
+ * library; `hgrid_intersect_all` with the same options returns the error.
  */
 typedef struct hgrid_query_options {
     /**
@@ -1310,7 +1315,8 @@ typedef struct hgrid_scene_hit {
 /**
  * The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
  *
- * With a `filter` or `counters` the rays of a batch are traced one by one, in their order.
+ * With a `filter` or `counters` the rays of a batch are traced one by one, in their order. With options that break the
+ * rules for structs, a query of one ray returns a miss, and stops a debug build of the library.
  */
 typedef struct hgrid_scene_options {
     /**

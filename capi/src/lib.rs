@@ -9,7 +9,7 @@
 //!
 //! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
 //! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
-//! which vector instructions the processor has.
+//! which vector instructions the processor has. Debug builds panic at the mistakes in `misuse`.
 //!
 //! The feature `malloc` adds the module `create`, which does allocate: it gets memory from the caller's
 //! allocator or the system's, and keeps the pointers to it.
@@ -49,10 +49,13 @@ mod version;
 #[cfg(all(target_arch = "arm", target_endian = "little", unix))]
 mod division;
 mod input;
+mod misuse;
 mod raw;
 #[cfg(not(feature = "rlib"))]
 mod runtime;
 mod span;
+#[cfg(all(not(feature = "rlib"), debug_assertions, any(unix, windows)))]
+mod stop;
 #[cfg(feature = "malloc")]
 mod system;
 
@@ -78,8 +81,9 @@ compile_error!(
      workspace with --release"
 );
 
-/// Nothing in this library or in core panics, so link-time optimisation drops this again.
-#[cfg(not(feature = "rlib"))]
+/// Nothing in a release build of this library or of core panics, so link-time optimisation drops this again. A debug
+/// build without a C library stays here at a failed assertion; others have the handler in `stop`.
+#[cfg(not(any(feature = "rlib", all(debug_assertions, any(unix, windows)))))]
 #[panic_handler]
 const fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {}

@@ -29,7 +29,8 @@ pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 /// A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
 /// `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
 /// with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
-/// `t_min > t_max` hits nothing.
+/// `t_min > t_max` hits nothing. A query of one ray stops a debug build of the library if all bytes of the ray are 0:
+/// then nobody has written it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray {
@@ -120,8 +121,8 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 /// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
 /// with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
 /// one by one.
-/// With options that break the rules for structs, a query of one ray returns a miss;
-/// `hgrid_intersect_all` with the same options returns the error.
+/// With options that break the rules for structs, a query of one ray returns a miss, and stops a debug build of the
+/// library; `hgrid_intersect_all` with the same options returns the error.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_query_options {

@@ -104,7 +104,8 @@ pub struct hgrid_scene_hit {
 
 /// The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
 ///
-/// With a `filter` or `counters` the rays of a batch are traced one by one, in their order.
+/// With a `filter` or `counters` the rays of a batch are traced one by one, in their order. With options that break the
+/// rules for structs, a query of one ray returns a miss, and stops a debug build of the library.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene_options {

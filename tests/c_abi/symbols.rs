@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use hgrid_tests::artefact::{Flavour, cargo_in, compiler, root, run, static_library, target_dir};
+use hgrid_tests::artefact::{Flavour, compiler, root, run, static_library};
 use hgrid_tests::symbols::{extract_ours, symbols, symbols_of_ours};
 use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
@@ -128,21 +128,8 @@ fn no_vector_operation_is_a_function() {
 #[test]
 #[ignore = "slow: compiles both flavours again"]
 fn neither_flavour_asks_for_a_library() {
-    let target = target_dir().join("link_line");
     for flavour in Flavour::ALL {
-        let mut rustc = cargo_in(&target, "rustc");
-        rustc.args(["-p", "hgrid-capi", "--crate-type", "staticlib"]).args(flavour.features());
-        let others = ["package.glam.opt-level=0", "package.libm.opt-level=0"];
-        let settings = ["opt-level=0", "panic='abort'"].into_iter().chain(others);
-        for setting in settings.map(|setting| format!("profile.dev.{setting}")) {
-            rustc.args(["--config", &setting]);
-        }
-        rustc.args(["--", "--print", "native-static-libs"]);
-        let told = String::from_utf8(run(&mut rustc).stderr).expect("text");
-        let libraries: Vec<_> =
-            told.lines().filter_map(|line| line.split_once("native-static-libs:")).collect();
-        let [(_, libraries)] = libraries[..] else { panic!("{told}") };
-        assert_eq!(libraries.trim(), "", "{flavour:?}");
+        assert_eq!(flavour.debug_build().links, "", "{flavour:?}");
     }
 }
 

@@ -8,7 +8,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::{env, fs};
 
 use cc::Tool;
@@ -85,6 +85,16 @@ impl Flavour {
         })
     }
 
+    /// Builds the static library with the dev profile, whose assertions stay on. They do not depend on its other
+    /// settings, so the quickest ones serve.
+    ///
+    /// # Panics
+    /// If cargo fails.
+    pub fn debug_build(self) -> &'static DebugBuild {
+        static BUILDS: [OnceLock<DebugBuild>; 2] = [const { OnceLock::new() }; 2];
+        BUILDS[self as usize].get_or_init(|| debug_build(self))
+    }
+
     /// Returns the path of the static library.
     #[must_use]
     pub fn static_library(self) -> PathBuf {
@@ -96,6 +106,15 @@ impl Flavour {
     pub fn shared_library(self) -> PathBuf {
         self.dir().join(shared_library_name())
     }
+}
+
+/// A static library as a debug build makes it.
+#[derive(Debug)]
+pub struct DebugBuild {
+    /// Its path.
+    pub library: PathBuf,
+    /// The libraries that rustc would tell a C programmer to link, separated by spaces.
+    pub links: String,
 }
 
 const STATIC_LIBRARY: &str = "libhgrid.a";
@@ -110,6 +129,28 @@ fn shared_library_name() -> String {
 pub fn library_with(features: &str) -> PathBuf {
     let arguments = ["--no-default-features", "--features", features];
     build_beside(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
+}
+
+fn debug_build(flavour: Flavour) -> DebugBuild {
+    // Both flavours share compiled dependencies, and so the path of the library.
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let target = target_dir().join("debug_builds");
+    let mut rustc = cargo_in(&target, "rustc");
+    rustc.args(["-p", "hgrid-capi", "--crate-type", "staticlib"]).args(flavour.features());
+    let others = ["package.glam.opt-level=0", "package.libm.opt-level=0"];
+    let settings = ["opt-level=0", "panic='abort'"].into_iter().chain(others);
+    for setting in settings.map(|setting| format!("profile.dev.{setting}")) {
+        rustc.args(["--config", &setting]);
+    }
+    rustc.args(["--", "--print", "native-static-libs"]);
+    let told = String::from_utf8(run(&mut rustc).stderr).expect("text");
+    let links: Vec<_> =
+        told.lines().filter_map(|line| line.split_once("native-static-libs:")).collect();
+    let [(_, links)] = links[..] else { panic!("{told}") };
+    let library = target.join(format!("{flavour:?}.a"));
+    fs::copy(target.join("debug").join(STATIC_LIBRARY), &library).expect("a library");
+    DebugBuild { library, links: links.trim().to_owned() }
 }
 
 /// Builds both libraries with some features in a folder of this name, and returns their folder.

@@ -10,6 +10,7 @@ use hgrid_core::{
 
 use super::batch_arrays::{Arrays, BatchArrays};
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
+use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{
     hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
 };
@@ -133,9 +134,9 @@ pub(crate) unsafe fn query<T>(
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }?.into();
+    let ray = unsafe { read(ray) }?.checked().into();
     // SAFETY: the caller's promise.
-    match unsafe { options(asked) }? {
+    match checked(unsafe { options(asked) })? {
         None => Ok(plain(grid, &ray)),
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(|options| with(grid, &ray, options)) }),
@@ -158,7 +159,7 @@ pub(crate) unsafe fn query_all(
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }?.into();
+    let ray = unsafe { read(ray) }?.checked().into();
     // SAFETY: the caller's promise.
     let asked = unsafe { options(asked) }?;
     if hits.is_null() && capacity > 0 {
@@ -206,7 +207,7 @@ pub(crate) unsafe fn closest(
     let hgrid_point_query { point, max_distance } = unsafe { read(query) }?;
     let find = |options: &mut QueryOptions<'_>| grid.closest_point(point, max_distance, options);
     // SAFETY: the caller's promise.
-    match unsafe { options(asked) }? {
+    match checked(unsafe { options(asked) })? {
         None => Ok(find(&mut QueryOptions::default())),
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(find) }),
@@ -225,7 +226,7 @@ pub(crate) unsafe fn surface(
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }?;
+    let ray = unsafe { read(ray) }?.checked();
     // SAFETY: the caller's promise.
     let hit = unsafe { read(hit) }?;
     Ok(grid.mesh().surface(&ray.into(), &hit.into()))

@@ -20,6 +20,7 @@ use super::{
 };
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
+use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{hgrid_counters, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
@@ -428,9 +429,9 @@ pub(crate) unsafe fn query_scene(
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
     // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }?.into();
+    let ray = unsafe { read(ray) }?.checked().into();
     // SAFETY: the caller's promise.
-    let asked = unsafe { Asked::read(asked) }?;
+    let asked = checked(unsafe { Asked::read(asked) })?;
     let find = |options: &mut SceneOptions<'_>| {
         if is_any {
             scene.occluded_with(&ray, options).then_some(SceneHit::MISS)
@@ -487,7 +488,7 @@ pub(crate) unsafe fn scene_surface(
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
     // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }?;
+    let ray = unsafe { read(ray) }?.checked();
     // SAFETY: the caller's promise.
     let hit = unsafe { read(hit) }?;
     Ok(scene.surface(&ray.into(), &hit.into()))

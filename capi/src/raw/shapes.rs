@@ -12,6 +12,7 @@ use super::batch_arrays::{Arrays, BatchArrays};
 use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, view_of, write};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
+use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{hgrid_query_options, hgrid_ray};
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
@@ -223,7 +224,7 @@ pub(crate) unsafe fn query_shapes(
     // SAFETY: this function's contract.
     let tested = unsafe { shapes(view) }?;
     // SAFETY: the caller's promise.
-    let ray: Ray = unsafe { read(ray) }?.into();
+    let ray: Ray = unsafe { read(ray) }?.checked().into();
     let mut test = |id: u32, ray: &Ray| tested.test(id, ray);
     let mut find = |options: &mut QueryOptions<'_>| {
         if is_any {
@@ -234,7 +235,7 @@ pub(crate) unsafe fn query_shapes(
         }
     };
     // SAFETY: the caller's promise.
-    match unsafe { all_options(asked) }? {
+    match checked(unsafe { all_options(asked) })? {
         None => Ok(find(&mut QueryOptions::default())),
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(find) }),
