@@ -201,13 +201,10 @@ impl Slab {
     }
 }
 
-/// Moves a point against a direction by at least an amount on each axis, however it is rounded.
-#[cold]
-#[inline(never)]
+/// Moves a point against a direction by at least an amount on each axis. The four operations round by at most 2^-24 of
+/// both terms each, so that 2^-22 of them is added.
+#[inline(always)]
 fn moved_back(point: Vec3A, by: f32, inverse: Vec3A) -> Vec3A {
-    let moved = |axis: usize| {
-        let (at, by) = (point[axis], by.copysign(inverse[axis]));
-        if by.is_sign_positive() { (at + by).next_up() } else { (at + by).next_down() }
-    };
-    Vec3A::new(moved(0), moved(1), moved(2))
+    let by = Vec3A::splat(by);
+    point + (by + (point.abs() + by) * (2.0 * f32::EPSILON)).copysign(inverse)
 }
