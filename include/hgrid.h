@@ -166,9 +166,9 @@
  * empty mesh builds and is never hit, and a triangle with a NaN or infinite vertex is left out and
  * counted, unless HGRID_BUILD_STRICT says otherwise.
  *
- * Queries of one ray or point that return no status answer with a miss if the options break the rules, and so
- * does every query of one ray for a ray of zeros. A debug build of the library (docs/c.md) stops the program at
- * both: it writes to stderr what is wrong and calls abort(); without an operating system it loops.
+ * A query of one ray or point that returns no status answers with a miss if its options break the rules. Every
+ * query of one ray finds nothing for a ray of zeros. A debug build of the library (docs/c.md) stops the program at
+ * both mistakes: it writes to stderr what is wrong and calls abort(); without an operating system it loops.
  *
  * Threads
  * -------
@@ -820,8 +820,8 @@ typedef struct hgrid_counters {
  * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
  * with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
  * one by one.
- * With options that break the rules for structs, a query of one ray returns a miss, and stops a debug build of the
- * library; `hgrid_intersect_all` with the same options returns the error.
+ * With options that break the rules for structs, a query of one ray or point returns a miss; a debug build of the
+ * library stops. `hgrid_intersect_all` with the same options returns the error.
  */
 typedef struct hgrid_query_options {
     /**
@@ -1262,6 +1262,7 @@ typedef struct hgrid_instance {
 /**
  * A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
  * of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
+ * A query stops a debug build of the library if all numbers of the ray are 0.
  */
 typedef struct hgrid_ray_f64 {
     /**
@@ -1316,7 +1317,7 @@ typedef struct hgrid_scene_hit {
  * The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
  *
  * With a `filter` or `counters` the rays of a batch are traced one by one, in their order. With options that break the
- * rules for structs, a query of one ray returns a miss, and stops a debug build of the library.
+ * rules for structs, a query of one ray returns a miss; a debug build of the library stops.
  */
 typedef struct hgrid_scene_options {
     /**

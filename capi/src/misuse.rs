@@ -26,8 +26,8 @@ pub(crate) trait CallersRay: Copy {
     /// Returns false if all bytes that are read are 0: then nobody has written the ray.
     fn is_written(&self) -> bool;
 
-    /// Returns the ray of a query of one ray; stops a debug build if nobody has written it. (A ray of another kind
-    /// without a direction is a miss in all builds, as the header says.)
+    /// Returns the ray of a query of one ray; stops a debug build if nobody has written it. (A ray that was written but
+    /// has no direction is a miss in all builds, as the header says.)
     #[inline(always)]
     fn checked(self) -> Self {
         if STOPS {

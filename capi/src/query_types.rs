@@ -121,8 +121,8 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 /// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
 /// with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
 /// one by one.
-/// With options that break the rules for structs, a query of one ray returns a miss, and stops a debug build of the
-/// library; `hgrid_intersect_all` with the same options returns the error.
+/// With options that break the rules for structs, a query of one ray or point returns a miss; a debug build of the
+/// library stops. `hgrid_intersect_all` with the same options returns the error.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_query_options {

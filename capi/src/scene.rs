@@ -71,6 +71,7 @@ impl hgrid_scene {
 
 /// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
 /// of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
+/// A query stops a debug build of the library if all numbers of the ray are 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray_f64 {
@@ -105,7 +106,7 @@ pub struct hgrid_scene_hit {
 /// The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
 ///
 /// With a `filter` or `counters` the rays of a batch are traced one by one, in their order. With options that break the
-/// rules for structs, a query of one ray returns a miss, and stops a debug build of the library.
+/// rules for structs, a query of one ray returns a miss; a debug build of the library stops.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene_options {

@@ -6,6 +6,18 @@
 //! one ray     against eight boxes
 //! more rays   sixteen against one box
 //! ```
+//!
+//! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the center of
+//! the group. A distance is `side * inverse - origin * inverse`, of which the second product is known before.
+//!
+//! ```text
+//! relative to the distance   near: node's origin 1, sum 1, growth 1, product 1, sum 1, inverse 1    6 u
+//!                            far: these, and the factor for far sides                               7 u
+//! absolute                   origin 1, its product 1, and 4 of those above, relative to the origin  6 u * origin
+//! ```
+//!
+//! The factor for far sides is 1 + 16 u, and boxes grow by 8 u times the largest coordinate of an origin. Products stay
+//! finite, because scenes of 2^48 and more are not traced in groups.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
@@ -27,7 +39,8 @@ pub(crate) struct WideBoxes<V> {
 /// Rays for slab tests: one in all lanes, or one a lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Slabs<V> {
-    pub(crate) origin: [V; 3],
+    /// Minus the origin times the inverse direction.
+    pub(crate) offset: [V; 3],
     pub(crate) inverse: [V; 3],
     pub(crate) start: V,
     pub(crate) end: V,
@@ -161,14 +174,15 @@ impl<V> WideBoxes<V> {
         (near, !near.simd_gt(far))
     }
 
-    /// Returns the distances at which rays cross the near and the far sides on an axis.
+    /// Returns the distances at which rays cross the near and the far sides on an axis. Their last bits differ between
+    /// machines that fuse the sum and others. No hit depends on them, only the order of boxes.
     #[inline(always)]
     fn cross<S: Simd>(&self, rays: &Slabs<V>, axis: usize) -> (V, V)
     where
         V: SimdFloat<S, Element = f32> + Extremes,
     {
-        let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
-        let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
+        let low = self.low[axis].mul_add(rays.inverse[axis], rays.offset[axis]);
+        let high = self.high[axis].mul_add(rays.inverse[axis], rays.offset[axis]);
         (low.lesser(high), low.greater(high))
     }
 }

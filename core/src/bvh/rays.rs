@@ -55,6 +55,8 @@ pub(crate) struct Rays {
     /// Relative to the center.
     origin: [PerRay; 3],
     inverse: [PerRay; 3],
+    /// Minus the product of both.
+    offset: [PerRay; 3],
     start: PerRay,
     end: PerRay,
     /// For the filter, with origins that are not relative.
@@ -75,6 +77,9 @@ pub(crate) struct Rays {
 
 /// Eight roundings of a number, in parts of it.
 const ROUNDINGS: f32 = 8.0 * UNIT;
+
+/// In larger scenes, products with [`STEEP`] may overflow.
+const MOST_EXTENT: f32 = 16_777_216.0 * 16_777_216.0; // 2^48
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
@@ -98,6 +103,7 @@ impl Rays {
             growth: 0.0,
             origin: [ZEROS; 3],
             inverse: [ZEROS; 3],
+            offset: [ZEROS; 3],
             start: ZEROS,
             end: ZEROS,
             anchor: [ZEROS; 3],
@@ -128,7 +134,9 @@ impl Rays {
         let half = (size * 0.5).to_array();
         let extent = size.max_element();
         self.extent = extent;
-        let near = f32x8::splat(simd, FAR_EXTENTS * extent);
+        // No ray is near a huge scene.
+        let near = if extent < MOST_EXTENT { FAR_EXTENTS * extent } else { -1.0 };
+        let near = f32x8::splat(simd, near);
         let zero = f32x8::splat(simd, 0.0);
         let finite = f32x8::splat(simd, f32::INFINITY);
         self.hits = [Hit::MISS; GROUP];
@@ -225,7 +233,9 @@ impl Rays {
                 let inverse = f32x8::simd_from(simd, self.inverse[axis][octet]);
                 farthest = farthest.greater(origin.abs());
                 self.origin[axis][octet] = origin.into();
-                self.inverse[axis][octet] = is_alive.select(inverse, inverse_of_first).into();
+                let inverse = is_alive.select(inverse, inverse_of_first);
+                self.inverse[axis][octet] = inverse.into();
+                self.offset[axis][octet] = (-(origin * inverse)).into();
             }
         }
         self.spread = farthest.reduce_max() * ROUNDINGS;
@@ -265,9 +275,9 @@ impl Rays {
     /// One ray in all lanes.
     #[inline(always)]
     pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<f32x8<S>> {
-        let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
+        let ([a, b, c], [d, e, f]) = (&self.offset, &self.inverse);
         Slabs {
-            origin: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
+            offset: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
             inverse: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
             start: f32x8::splat(simd, get(&self.start, ray)),
             end: f32x8::splat(simd, get(&self.end, ray)),
@@ -277,9 +287,9 @@ impl Rays {
     /// Sixteen rays.
     #[inline(always)]
     pub(crate) fn sixteen<S: Simd>(&self, simd: S, which: usize) -> Slabs<f32x16<S>> {
-        let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
+        let ([a, b, c], [d, e, f]) = (&self.offset, &self.inverse);
         Slabs {
-            origin: [sixteen(simd, a, which), sixteen(simd, b, which), sixteen(simd, c, which)],
+            offset: [sixteen(simd, a, which), sixteen(simd, b, which), sixteen(simd, c, which)],
             inverse: [sixteen(simd, d, which), sixteen(simd, e, which), sixteen(simd, f, which)],
             start: sixteen(simd, &self.start, which),
             end: sixteen(simd, &self.end, which),

@@ -170,6 +170,7 @@ fn walk_deep<F: Search, T: Tally>(
         if let Some(first) = stack.first_chunk_mut() {
             *first = *begun;
         }
+        // A tree never fills this stack. Damaged bytes may, and then the walk ends.
         walk_on(one, simd, stack);
     });
 }

@@ -77,7 +77,9 @@ pub(super) fn meet_leaf(
     pad: f32,
     end: f32,
 ) -> (u32, [f32; WIDTH]) {
-    let (flips, inverse_far) = (flips_of(slab), slab.inverse_far());
+    let flips = flips_of(slab);
+    let (origin_near, origin_far) = (slab.origin_near.to_array(), slab.origin_far.to_array());
+    let (inverse, inverse_far) = (slab.inverse.to_array(), slab.inverse_far().to_array());
     let (mut met, mut nearest) = (0, [0.0; WIDTH]);
     for (lane, (&id, nearest)) in ids.iter().zip(&mut nearest).enumerate() {
         let Some([a, b, _]) = mesh.triangle(id) else { continue };
@@ -86,8 +88,8 @@ pub(super) fn meet_leaf(
             let (low, high) = (lesser(a[axis], b[axis]), greater(a[axis], b[axis]));
             let (first, last) = if flips[axis] == 0 { (low, high) } else { (high, low) };
             let pad = inverse_far[axis].abs() * pad;
-            near = greater((first - slab.origin_near[axis]) * slab.inverse[axis] - pad, near);
-            far = lesser((last - slab.origin_far[axis]) * inverse_far[axis] + pad, far);
+            near = greater((first - origin_near[axis]) * inverse[axis] - pad, near);
+            far = lesser((last - origin_far[axis]) * inverse_far[axis] + pad, far);
         }
         *nearest = near;
         let is_missed = near > far;
