@@ -295,8 +295,10 @@ fn takes_little_stack(arguments: &[&str]) {
         let line = printed.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.and_then(|bytes| bytes.parse::<usize>().ok()).expect("a number")
     };
+    // The stacks of a walk through a deep tree and a shallow one; a ray that does not need them takes less than this.
+    let (deep, shallow) = (449 * 8, 99 * 8);
     for name in ["one", "options", "closest", "shapes"] {
-        assert!((500..7 << 10).contains(&most(name)), "{name}: {}", most(name));
+        assert!((deep + 2000..7 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers alone hold 128 rays and 128 hits.
     for name in ["many", "shapes_many"] {
@@ -305,10 +307,10 @@ fn takes_little_stack(arguments: &[&str]) {
     for name in ["build", "scenes"] {
         assert!((2000..18 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
-    // One scene, and four nested scenes.
-    for (name, scenes) in [("scene", 1), ("nested", 4)] {
+    // One scene, and four nested scenes: a ray in a deep tree inside a scene whose tree fills the first stack, too.
+    for (name, scenes, short) in [("scene", 1, 7600), ("nested", 4, 14_300)] {
         let promised = (8 * scenes + 7) << 10;
-        assert!((1000..promised).contains(&most(name)), "{name}: {}", most(name));
+        assert!((short + deep + shallow..promised).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers hold the rays of a group twice, outside and inside an instance.
     for (name, inside) in [("scene_many", 0), ("nested_many", 3)] {

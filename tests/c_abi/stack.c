@@ -1,13 +1,18 @@
 /* Prints the stack use of queries and builds in bytes, one "name most" a line: the most over all methods and
  * meshes, on a stack that was filled before. The meshes are a sheet, the sheet with a crowd of small
- * triangles on it, and for trees (with an argument for all methods) the sheet with a crowd in the crowd.
- * Grids also stand in scenes, and their triangles serve as shapes. */
+ * triangles on it, for trees (with an argument for all methods) the sheet with a crowd in the crowd, and for trees
+ * the sheet in a tangle. Grids also stand in scenes, and their triangles serve as shapes.
+ *
+ * A ray that meets many boxes at once takes more stack than others. In a tangle it does: long triangles overlap, and
+ * a chain of ever smaller ones makes a deep tree. The instances of a scene have such a chain, too. */
 
 #include "check.h"
 
 #include <ucontext.h>
 
-enum { RAYS = 768, STACK = 256 * 1024, CROWDS = 2, CROWD = 17000 };
+enum { TILED = 768, RAYS = TILED + 256, STACK = 256 * 1024, CROWDS = 2, CROWD = 17000 };
+/* The triangles of a tangle, and those of them in the chain. A mesh with a tangle has the number behind the crowds. */
+enum { TANGLE = 1480, CHAIN = 480, TANGLED = CROWDS + 1 };
 
 /* The centre of the crowds, and half the width of each. */
 static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};
@@ -16,6 +21,8 @@ static float positions[VERTICES + CROWDS * CROWD * 3][3];
 static uint32_t indices[TRIANGLES + CROWDS * CROWD][3];
 
 static hgrid_mesh mesh;
+/* The mesh is a tangle, which takes rays long. */
+static bool is_tangled;
 
 /* A build with memory for it. */
 typedef struct {
@@ -82,43 +89,50 @@ static void many(void)
     const hgrid_query_options all = options();
     hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
     masked.mask = 1;
+    const int first = is_tangled ? RAYS - 64 : 0;
+    const size_t count = (size_t)(RAYS - first);
+    const hgrid_ray *const far = mixed + first, *const near = rays + first;
     for (hgrid_coherence c = 0; c < 2; c++) {
         /* Rays far from each other, some of them to be sorted, some to be traced alone. */
-        CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
-        CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, &masked) == HGRID_OK);
-        CHECK(hgrid_occluded_n(&grid, mixed, 0, occluded, 0, RAYS, c, &masked) == HGRID_OK);
-        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
-        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
-        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, &all) == HGRID_OK);
-        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
-        CHECK(hgrid_occluder_n(&grid, mixed, 0, occluders, 0, RAYS, c, NULL) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, far, 0, hits, 0, count, c, NULL) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, far, 0, hits, 0, count, c, &masked) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, far, 0, occluded, 0, count, c, &masked) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, near, 0, hits, 0, count, c, NULL) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, near, 0, occluded, 0, count, c, NULL) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, near, 0, hits, 0, count, c, &all) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, near, 0, occluded, 0, count, c, &all) == HGRID_OK);
+        CHECK(hgrid_occluder_n(&grid, far, 0, occluders, 0, count, c, NULL) == HGRID_OK);
         /* A filter that rejects, after a group of rays was traced, for each order of the rays. */
-        const hgrid_ray *each[] = {mixed, rays};
+        const hgrid_ray *each[] = {far, near};
         for (int i = 0; i < 4; i++) {
             hgrid_query_options asking = HGRID_QUERY_OPTIONS_INIT;
             asking.filter = reject, asking.context = &grid;
             asking.filter_mask = i < 2 ? 0 : 1;
             const hgrid_ray *from = each[i % 2];
-            CHECK(hgrid_intersect_n(&grid, from, 0, hits, 0, RAYS, c, &asking) == HGRID_OK);
-            CHECK(hgrid_occluded_n(&grid, from, 0, occluded, 0, RAYS, c, &asking) == HGRID_OK);
-            CHECK(hgrid_occluder_n(&grid, from, 0, occluders, 0, RAYS, c, &asking) == HGRID_OK);
+            CHECK(hgrid_intersect_n(&grid, from, 0, hits, 0, count, c, &asking) == HGRID_OK);
+            CHECK(hgrid_occluded_n(&grid, from, 0, occluded, 0, count, c, &asking) == HGRID_OK);
+            CHECK(hgrid_occluder_n(&grid, from, 0, occluders, 0, count, c, &asking) == HGRID_OK);
         }
     }
 }
 
-enum { SHOWN = 12, SHOWN_SCENES = 2 };
+enum { SHOWN = 12, SHOWN_FEW = 2, LINKS = 240, SHAPES = TRIANGLES + TANGLE };
 
 /* Nested scenes around a tree, each of which shows the one before, as deep as allowed. */
-static hgrid_object shown[HGRID_MAX_NESTING];
+static hgrid_object shown[HGRID_MAX_NESTING][2];
 static hgrid_scene around[HGRID_MAX_NESTING];
 static hgrid_shapes corners;
 /* A scene that shows all kinds of objects, nested as deep as allowed. */
 static hgrid_scene all_kinds;
-HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BOUND(SHOWN)];
+HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BOUND(SHOWN + LINKS)];
 HGRID_ALIGNED static unsigned char all_kinds_blob[HGRID_SCENE_BOUND(SHOWN)];
-HGRID_ALIGNED static unsigned char small_scratch[HGRID_SCRATCH_BOUND(TRIANGLES)];
-HGRID_ALIGNED static unsigned char shape_blob[HGRID_INDEX_BOUND(TRIANGLES)];
-static float corner_boxes[TRIANGLES][6];
+HGRID_ALIGNED static unsigned char small_scratch[HGRID_BVH_HIGH_SCRATCH_BOUND(SHAPES)];
+HGRID_ALIGNED static unsigned char shape_blob[HGRID_INDEX_BOUND(SHAPES)];
+HGRID_ALIGNED static unsigned char link_blob[HGRID_INDEX_BOUND(TRIANGLES)];
+static float corner_boxes[SHAPES][6];
+/* The mesh of the instances in chains, and its tree. */
+static sheet link_mesh;
+static hgrid_grid link_tree;
 
 static hgrid_verdict reject_in_scene(void *context, const hgrid_scene_hit *hit)
 {
@@ -148,9 +162,11 @@ static void ask_scene_together(const hgrid_scene *scene)
     static hgrid_scene_hit found[RAYS];
     static unsigned char sorted[16 * RAYS];
     const hgrid_ray *each[] = {mixed, rays};
+    const int first = is_tangled ? RAYS - 64 : 0;
+    const size_t count = (size_t)(RAYS - first);
     for (int order = 0; order < 2; order++) {
-        for (int i = 0; i < RAYS; i++) {
-            const hgrid_ray *from = &each[order][i];
+        for (int i = 0; i < RAYS - first; i++) {
+            const hgrid_ray *from = &each[order][first + i];
             hgrid_ray_f64 ray = {{0, 0, 0}, {0, 0, 0}, from->t_min, from->t_max, 0};
             /* Origins that float cannot represent are rounded in the scene's tree. */
             for (int axis = 0; axis < 3; axis++)
@@ -161,10 +177,10 @@ static void ask_scene_together(const hgrid_scene *scene)
         all.filter = reject_in_scene, all.context = &grid, all.counters = &counters;
         masked.mask = 1, masked.cull = HGRID_CULL_BACK, masked.scratch = sorted, masked.scratch_bytes = sizeof sorted;
         for (hgrid_coherence c = 0; c < 2; c++) {
-            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, RAYS, c, NULL) == HGRID_OK);
-            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
-            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, RAYS, c, &masked) == HGRID_OK);
-            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, RAYS, c, &masked) == HGRID_OK);
+            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, count, c, NULL) == HGRID_OK);
+            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, count, c, NULL) == HGRID_OK);
+            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, count, c, &masked) == HGRID_OK);
+            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, count, c, &masked) == HGRID_OK);
             CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, 64, c, &all) == HGRID_OK);
             CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, 64, c, &all) == HGRID_OK);
         }
@@ -215,31 +231,56 @@ static void boxes_of_triangles_together(void)
     hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_query_options all = options();
     const hgrid_ray *each[] = {mixed, rays};
+    const int first = is_tangled ? RAYS - 64 : 0;
+    const size_t count = (size_t)(RAYS - first);
     masked.mask = 1, masked.scratch = sorted, masked.scratch_bytes = sizeof sorted;
     for (int order = 0; order < 2; order++)
         for (hgrid_coherence c = 0; c < 2; c++) {
-            CHECK(hgrid_intersect_shapes_n(&corners, each[order], 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
-            CHECK(hgrid_occluded_shapes_n(&corners, each[order], 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
-            CHECK(hgrid_intersect_shapes_n(&corners, each[order], 0, hits, 0, RAYS, c, &masked) == HGRID_OK);
-            CHECK(hgrid_occluded_shapes_n(&corners, each[order], 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
+            CHECK(hgrid_intersect_shapes_n(&corners, each[order] + first, 0, hits, 0, count, c, NULL) == HGRID_OK);
+            CHECK(hgrid_occluded_shapes_n(&corners, each[order] + first, 0, occluded, 0, count, c, NULL) == HGRID_OK);
+            CHECK(hgrid_intersect_shapes_n(&corners, each[order] + first, 0, hits, 0, count, c, &masked) == HGRID_OK);
+            CHECK(hgrid_occluded_shapes_n(&corners, each[order] + first, 0, occluded, 0, count, c, &all) == HGRID_OK);
         }
 }
 
-/* Builds scenes of overlapping instances, and shapes as large as the triangles of the sheet. */
-static void build_scenes(void)
+/* Returns the quality of the grid, if it is a tree. */
+static hgrid_config tree_config(void)
 {
-    for (int level = 0; level < HGRID_MAX_NESTING; level++) {
-        hgrid_instance instances[SHOWN];
-        for (int i = 0; i < SHOWN; i++) {
-            const hgrid_instance fresh = HGRID_INSTANCE_INIT;
-            instances[i] = fresh, instances[i].translation[i % 3] = 0.01 * i;
-        }
-        CHECK((level == 0 ? hgrid_object_grid(&grid, &shown[0]) : hgrid_object_scene(&around[level - 1], &shown[level])) ==
-              HGRID_OK);
-        CHECK(hgrid_build_scene(instances, level == 0 ? SHOWN : SHOWN_SCENES, &shown[level], 1, NULL, scene_blobs[level],
-                                sizeof scene_blobs[level], small_scratch, sizeof small_scratch, &around[level], NULL) == HGRID_OK);
+    hgrid_config config = HGRID_CONFIG_INIT;
+    config.quality = by_one_task.config.quality;
+    return config;
+}
+
+/* Builds a scene of instances of the first object, which overlap, and of a chain of instances of the second: their
+ * boxes share a corner, where a ray along the diagonal enters all of them before it enters those of the first. */
+static void build_level(int level, int count)
+{
+    static hgrid_instance instances[SHOWN + LINKS];
+    const hgrid_config config = tree_config();
+    for (int i = 0; i < count; i++) {
+        const hgrid_instance fresh = HGRID_INSTANCE_INIT;
+        instances[i] = fresh, instances[i].translation[i % 3] = 0.01 * i;
+        for (int axis = 0; axis < 3; axis++)
+            instances[i].translation[axis] += 0.02;
     }
-    for (int i = 0; i < TRIANGLES; i++)
+    for (int i = 0; i < LINKS; i++) {
+        const hgrid_instance fresh = HGRID_INSTANCE_INIT;
+        hgrid_instance *const link = &instances[count + i];
+        *link = fresh, link->object = 1;
+        for (int axis = 0; axis < 3; axis++)
+            link->linear[axis][axis] = ldexpf(1, -i / 2);
+    }
+    CHECK(hgrid_build_scene(instances, (size_t)count + LINKS, shown[level], 2, &config, scene_blobs[level],
+                            sizeof scene_blobs[level], small_scratch, sizeof small_scratch, &around[level],
+                            NULL) == HGRID_OK);
+}
+
+/* Builds shapes as large as the first triangles of the mesh. */
+static void build_shapes(void)
+{
+    const hgrid_config config = tree_config();
+    const size_t most = SHAPES, count = mesh.triangle_count < most ? mesh.triangle_count : most;
+    for (size_t i = 0; i < count; i++)
         for (int axis = 0; axis < 3; axis++) {
             float *const low = &corner_boxes[i][axis], *const high = low + 3;
             *low = *high = positions[indices[i][0]][axis];
@@ -249,9 +290,27 @@ static void build_scenes(void)
             }
         }
     hgrid_boxes boxes = HGRID_BOXES_INIT;
-    boxes.boxes = corner_boxes, boxes.count = TRIANGLES, boxes.test = meet_middle;
-    CHECK(hgrid_build_shapes(&boxes, NULL, shape_blob, sizeof shape_blob, small_scratch, sizeof small_scratch, &corners,
-                             NULL) == HGRID_OK);
+    boxes.boxes = corner_boxes, boxes.count = count, boxes.test = meet_middle;
+    CHECK(hgrid_build_shapes(&boxes, &config, shape_blob, sizeof shape_blob, small_scratch, sizeof small_scratch,
+                             &corners, NULL) == HGRID_OK);
+}
+
+/* Builds nested scenes, shapes, and a scene of both. */
+static void build_scenes(void)
+{
+    make_sheet(&link_mesh);
+    const hgrid_mesh link = mesh_of(&link_mesh);
+    CHECK(hgrid_build(&link, NULL, link_blob, sizeof link_blob, small_scratch, sizeof small_scratch, &link_tree,
+                      NULL) == HGRID_OK);
+    for (int level = 0; level < HGRID_MAX_NESTING; level++) {
+        hgrid_object *const inner = &shown[level][0];
+        const hgrid_status status = level == 0 ? hgrid_object_grid(&grid, inner)
+                                               : hgrid_object_scene(&around[level - 1], inner);
+        CHECK(status == HGRID_OK);
+        CHECK(hgrid_object_grid(&link_tree, &shown[level][1]) == HGRID_OK);
+        build_level(level, level == 0 && !is_tangled ? SHOWN : SHOWN_FEW);
+    }
+    build_shapes();
     static hgrid_object kinds[3];
     hgrid_instance instances[3];
     for (uint32_t i = 0; i < 3; i++) {
@@ -389,12 +448,29 @@ static hgrid_mesh crowded(uint32_t crowds)
     return all;
 }
 
-int main(int argc, char **argv)
+/* Returns the sheet in a tangle: long triangles, and a chain of triangles around the origin. */
+static hgrid_mesh tangled(void)
 {
-    (void)argv;
-    for (int i = 0; i < RAYS; i++) {
+    hgrid_mesh all = crowded(0);
+    for (uint32_t i = 0; i < TANGLE; i++) {
+        /* Four triangles of each size. */
+        const float size = i < CHAIN ? ldexpf(1, -(int)(i / 4)) : 1;
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            const uint32_t vertex = VERTICES + 3 * i + corner;
+            indices[TRIANGLES + i][corner] = vertex;
+            for (int axis = 0; axis < 3; axis++)
+                positions[vertex][axis] = size * random_number();
+        }
+    }
+    all.vertex_count += TANGLE * 3, all.triangle_count += TANGLE;
+    return all;
+}
+
+static void make_rays(void)
+{
+    for (int i = 0; i < TILED; i++) {
         /* Tiles of the sheet, some of them with rays in other directions, then tiles of the crowds. */
-        const int tile = i / 64, pixel = i % 64, crowd = i / 128 - RAYS / 128 + CROWDS;
+        const int tile = i / 64, pixel = i % 64, crowd = i / 128 - TILED / 128 + CROWDS;
         const float u = (float)(pixel % 8), v = (float)(pixel / 8);
         rays[i] = ray_down((float)(tile % 4) / 4 + u / 32, (float)(tile / 4) / 4 + v / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
@@ -408,12 +484,27 @@ int main(int argc, char **argv)
             rays[i].direction[0] = i % 7 == 0 ? -3.0f : 0.0f;
         }
     }
+    for (int i = TILED; i < RAYS; i++) {
+        /* Start at the end of the chains, along the diagonal or in any direction, and anywhere in the tangle. */
+        const bool is_diagonal = i % 16 == 0;
+        for (int axis = 0; axis < 3; axis++) {
+            rays[i].origin[axis] = i % 2 == 0 ? 0 : random_number();
+            rays[i].direction[axis] = is_diagonal ? 1 : random_number();
+        }
+        rays[i].t_min = 0, rays[i].t_max = INFINITY;
+    }
     for (int i = 0; i < RAYS; i++) {
         /* The first window starts at two places, the rest anywhere. */
         const float there = (float)(i % 2) / 2 + (float)(i % 64) / 1000;
         mixed[i] = i < 512 ? ray_down(0.1f + there, 0.2f) : rays[i * 127 % RAYS];
         mixed[i].direction[1] = (float)(i % 5) / 10;
     }
+}
+
+int main(int argc, char **argv)
+{
+    (void)argv;
+    make_rays();
     /* The builds come first: the queries use the grid that they leave. */
     struct {
         const char *name;
@@ -425,12 +516,13 @@ int main(int argc, char **argv)
                  {"scene_many", flat_scene_together, 0}, {"nested_many", nested_scenes_together, 0},
                  {"shapes", boxes_of_triangles, 0}, {"shapes_many", boxes_of_triangles_together, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
-    for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)
+    for (uint32_t crowds = 0; crowds <= TANGLED; crowds++)
         for (int method = 0; method <= METHODS; method++) {
             /* Grids over a crowd in a crowd need no more stack, and take half a minute: only with an argument. */
-            if (argc < 2 && crowds == CROWDS && method < METHODS - 1)
+            if ((argc < 2 || crowds == TANGLED) && crowds >= CROWDS && method < METHODS - 1)
                 continue;
-            mesh = crowded(crowds);
+            is_tangled = crowds == TANGLED;
+            mesh = is_tangled ? tangled() : crowded(crowds);
             by_one_task = job_of(method, 1), by_many_tasks = job_of(method, HGRID_MAX_TASKS);
             for (int i = 0; i < CALLS; i++) {
                 /* The other methods always build with one task. */
