@@ -1953,7 +1953,7 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * or with options that break the rules for structs, nothing is hit. A query of an uninitialised view, or
  * of one whose blob or mesh is gone, is undefined behaviour.
  *
- * A query allocates nothing and needs at most 7 KiB of stack, as all queries of one ray or point do. It
+ * A query allocates nothing and needs at most 9 KiB of stack, as all queries of one ray or point do. It
  * always ends: in a grid of one level after at most as many steps as the three resolutions add up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
@@ -2204,7 +2204,7 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * (also of `scratch`),
  * `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
  *
- * The call allocates nothing and needs at most 36 KiB of stack.
+ * The call allocates nothing and needs at most 40 KiB of stack.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
@@ -2593,7 +2593,7 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
  * Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
  * `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
  *
- * The call allocates nothing and needs at most 36 KiB of stack, and what the test needs.
+ * The call allocates nothing and needs at most 40 KiB of stack, and what the test needs.
  *
  * Threads: any number of queries on the same tree at once; each thread with hits and counters of its own.
  */
@@ -2829,7 +2829,7 @@ hgrid_status hgrid_open_packed_scene(const void *blob,
  * NULL, a view of zeros, or options that break the rules for structs nothing is hit.
  *
  * A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside
- * it, and 7 KiB for a grid.
+ * it, and 9 KiB for a grid.
  *
  * Threads: any number of queries on the same scene at once; each thread with counters of its own.
  */

@@ -63,7 +63,7 @@ use crate::types::hgrid_grid;
 /// (also of `scratch`),
 /// `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
 ///
-/// The call allocates nothing and needs at most 36 KiB of stack.
+/// The call allocates nothing and needs at most 40 KiB of stack.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.

@@ -23,7 +23,7 @@ use crate::types::hgrid_grid;
 /// or with options that break the rules for structs, nothing is hit. A query of an uninitialised view, or
 /// of one whose blob or mesh is gone, is undefined behaviour.
 ///
-/// A query allocates nothing and needs at most 7 KiB of stack, as all queries of one ray or point do. It
+/// A query allocates nothing and needs at most 9 KiB of stack, as all queries of one ray or point do. It
 /// always ends: in a grid of one level after at most as many steps as the three resolutions add up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.

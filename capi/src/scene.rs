@@ -511,7 +511,7 @@ pub unsafe extern "C" fn hgrid_open_packed_scene(
 /// NULL, a view of zeros, or options that break the rules for structs nothing is hit.
 ///
 /// A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside
-/// it, and 7 KiB for a grid.
+/// it, and 9 KiB for a grid.
 ///
 /// Threads: any number of queries on the same scene at once; each thread with counters of its own.
 ///

@@ -294,7 +294,7 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 /// Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
 /// `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
 ///
-/// The call allocates nothing and needs at most 36 KiB of stack, and what the test needs.
+/// The call allocates nothing and needs at most 40 KiB of stack, and what the test needs.
 ///
 /// Threads: any number of queries on the same tree at once; each thread with hits and counters of its own.
 ///

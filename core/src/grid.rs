@@ -29,7 +29,7 @@ use crate::visit::Visitor;
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
-/// their steps are bounded (docs/bounds.md). A single query's stack is below 7 KiB, a batch's below 36 KiB.
+/// their steps are bounded (docs/bounds.md). A single query's stack is below 9 KiB, a batch's below 40 KiB.
 #[derive(Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,

@@ -272,8 +272,8 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB for one
-/// with tasks and 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid; for a
+/// The header promises 9 KiB for a ray or a point, 40 KiB for a batch, 18 KiB for a build, 96 KiB for one
+/// with tasks and 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 9 KiB for a grid; for a
 /// batch in a scene 80 KiB, and 8 KiB for each scene inside it.
 #[test]
 fn queries_and_builds_take_little_stack() {
@@ -298,18 +298,18 @@ fn takes_little_stack(arguments: &[&str]) {
     // The stacks of a walk through a deep tree and a shallow one; a ray that does not need them takes less than this.
     let (deep, shallow) = (449 * 8, 99 * 8);
     for name in ["one", "options", "closest", "shapes"] {
-        assert!((deep + 2000..7 << 10).contains(&most(name)), "{name}: {}", most(name));
+        assert!((deep + 2000..9 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers alone hold 128 rays and 128 hits.
     for name in ["many", "shapes_many"] {
-        assert!((128 * 48..36 << 10).contains(&most(name)), "{name}: {}", most(name));
+        assert!((128 * 48..40 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     for name in ["build", "scenes"] {
         assert!((2000..18 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     // One scene, and four nested scenes: a ray in a deep tree inside a scene whose tree fills the first stack, too.
-    for (name, scenes, short) in [("scene", 1, 7600), ("nested", 4, 14_300)] {
-        let promised = (8 * scenes + 7) << 10;
+    for (name, scenes, short) in [("scene", 1, 7100), ("nested", 4, 13_900)] {
+        let promised = (8 * scenes + 9) << 10;
         assert!((short + deep + shallow..promised).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers hold the rays of a group twice, outside and inside an instance.

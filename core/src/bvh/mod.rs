@@ -118,11 +118,7 @@ impl<'a> Bvh<'a> {
     /// Lends a stack for a point, or for a ray that has filled its first one. Most trees are shallow and get a small one, which takes less time to zero.
     #[inline(always)]
     pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
-        if self.levels <= walk::FEW_LEVELS {
-            walk(&mut [0; walk::SMALL_STACK])
-        } else {
-            with_deep_stack(walk)
-        }
+        if self.levels <= walk::FEW_LEVELS { with_small_stack(walk) } else { with_deep_stack(walk) }
     }
 
     /// The number of ids in all leaves.
@@ -199,7 +195,12 @@ impl<'a> Bvh<'a> {
     }
 }
 
-/// Out of line, or shallow trees would have the large stack, too.
+/// Out of line, as the next function is: otherwise each would have the stack of both.
+#[inline(never)]
+fn with_small_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
+    walk(&mut [0; walk::SMALL_STACK])
+}
+
 #[inline(never)]
 fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
     walk(&mut [0; walk::STACK])

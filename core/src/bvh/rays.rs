@@ -13,7 +13,7 @@ use zerocopy::{transmute_mut, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
-use crate::aabb::{Aabb, lesser};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
 use crate::extremes::Extremes;
@@ -52,11 +52,11 @@ pub(crate) struct Rays {
     spread: f32,
     /// The growth of boxes that covers both: `spread + origin_error`.
     pub(crate) growth: f32,
-    /// Relative to the center.
-    origin: [PerRay; 3],
     inverse: [PerRay; 3],
-    /// Minus the product of both.
+    /// Minus the origin, relative to the center, times the inverse direction.
     offset: [PerRay; 3],
+    /// The least and the greatest coordinate of the origins, relative to the center, on each axis.
+    origins: [[f32; 2]; 3],
     start: PerRay,
     end: PerRay,
     /// For the filter, with origins that are not relative.
@@ -101,9 +101,9 @@ impl Rays {
             origin_error: 0.0,
             spread: 0.0,
             growth: 0.0,
-            origin: [ZEROS; 3],
             inverse: [ZEROS; 3],
             offset: [ZEROS; 3],
+            origins: [[0.0; 2]; 3],
             start: ZEROS,
             end: ZEROS,
             anchor: [ZEROS; 3],
@@ -183,7 +183,6 @@ impl Rays {
                 let inverse = is_less.select(inverse, steep.copysign(direction));
                 self.inverse[axis][octet] = inverse.into();
                 self.direction[axis][octet] = direction.into();
-                self.origin[axis][octet] = origin[axis].into();
                 self.anchor[axis][octet] = origin[axis].into();
             }
             // The caller's range is decided exactly: it needs no room for the error of a hit's `t`.
@@ -222,30 +221,35 @@ impl Rays {
     fn settle<S: Simd>(&mut self, simd: S) {
         let first = self.alive.trailing_zeros();
         self.center = self.given[first as usize % GROUP].origin;
-        let mut farthest = f32x8::splat(simd, 0.0);
+        let mut farthest = 0.0;
         for axis in 0..3 {
+            let zero = f32x8::splat(simd, 0.0);
+            let (mut low, mut high) = (zero, zero);
             let center = f32x8::splat(simd, self.center[axis]);
             let inverse_of_first = f32x8::splat(simd, get(&self.inverse[axis], first));
             for octet in 0..OCTETS {
                 let is_alive = mask32x8::from_bitmask(simd, self.alive >> (8 * octet));
-                let origin = f32x8::simd_from(simd, self.origin[axis][octet]) - center;
-                let origin = is_alive.select(origin, f32x8::splat(simd, 0.0));
+                let origin = f32x8::simd_from(simd, self.anchor[axis][octet]) - center;
+                let origin = is_alive.select(origin, zero);
+                (low, high) = (low.lesser(origin), high.greater(origin));
                 let inverse = f32x8::simd_from(simd, self.inverse[axis][octet]);
-                farthest = farthest.greater(origin.abs());
-                self.origin[axis][octet] = origin.into();
                 let inverse = is_alive.select(inverse, inverse_of_first);
                 self.inverse[axis][octet] = inverse.into();
                 self.offset[axis][octet] = (-(origin * inverse)).into();
             }
+            // The first ray's coordinate is 0.
+            let (low, high) = (low.reduce_min(), high.reduce_max());
+            self.origins[axis] = [low, high];
+            farthest = greater(farthest, greater(-low, high));
         }
-        self.spread = farthest.reduce_max() * ROUNDINGS;
+        self.spread = farthest * ROUNDINGS;
         self.growth = self.spread + self.origin_error;
     }
 
     /// All rays as one beam, before any of them is done.
     #[inline(always)]
     pub(crate) fn beam<S: Simd>(&self, simd: S) -> Beam<S> {
-        let [a, b, c] = &self.origin;
+        let [a, b, c] = self.origins;
         let [d, e, f] = &self.inverse;
         let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
         let [x, y, z] = inverses;
@@ -259,11 +263,7 @@ impl Rays {
             end = end.greater(is_alive.select(to, first));
         }
         Beam {
-            origin: [
-                ends(simd, interval(simd, a)),
-                ends(simd, interval(simd, b)),
-                ends(simd, interval(simd, c)),
-            ],
+            origin: [ends(simd, a), ends(simd, b), ends(simd, c)],
             inverse: [ends(simd, x), ends(simd, y), ends(simd, z)],
             is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
             is_positive: inverses.map(|[low, _]| low > 0.0),
