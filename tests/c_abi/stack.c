@@ -116,7 +116,7 @@ static void many(void)
     }
 }
 
-enum { SHOWN = 12, SHOWN_FEW = 2, LINKS = 240, SHAPES = TRIANGLES + TANGLE };
+enum { SHOWN = 12, SHOWN_FEW = 2, LINKS = 240, SHAPES = (int)TRIANGLES + (int)TANGLE };
 
 /* Nested scenes around a tree, each of which shows the one before, as deep as allowed. */
 static hgrid_object shown[HGRID_MAX_NESTING][2];

@@ -7,8 +7,8 @@
 //! more rays   sixteen against one box
 //! ```
 //!
-//! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the center of
-//! the group. A distance is `side * inverse - origin * inverse`, of which the second product is known before.
+//! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
+//! center of the group. A distance is `side * inverse - origin * inverse`, of which the second product is known before.
 //!
 //! ```text
 //! relative to the distance   near: node's origin 1, sum 1, growth 1, product 1, sum 1, inverse 1    6 u

@@ -115,7 +115,8 @@ impl<'a> Bvh<'a> {
         Ok(Self { nodes, ids, levels: header.levels.min(LEVELS) })
     }
 
-    /// Lends a stack for a point, or for a ray that has filled its first one. Most trees are shallow and get a small one, which takes less time to zero.
+    /// Lends a stack for a point, or for a ray that has filled its first one. Most trees are shallow and get a small
+    /// one, which takes less time to zero.
     #[inline(always)]
     pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
         if self.levels <= walk::FEW_LEVELS { with_small_stack(walk) } else { with_deep_stack(walk) }

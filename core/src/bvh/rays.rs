@@ -134,7 +134,7 @@ impl Rays {
         let half = (size * 0.5).to_array();
         let extent = size.max_element();
         self.extent = extent;
-        // No ray is near a huge scene.
+        // In a huge scene no ray counts as near: all are traced alone.
         let near = if extent < MOST_EXTENT { FAR_EXTENTS * extent } else { -1.0 };
         let near = f32x8::splat(simd, near);
         let zero = f32x8::splat(simd, 0.0);

@@ -10,9 +10,9 @@
 //! ```
 //!
 //! Two things cost a ray more than its arithmetic. A child's place follows from the boxes of its node, so one node
-//! waits for the other: [`predicted`] jumps to the child, so that the processor can guess it. And a stack for the deepest
-//! tree takes as long to zero as a node to test: a ray begins on a short one, and [resumes](Resume) on a larger one if
-//! that is full.
+//! waits for the other: [`predicted`] jumps to the child, so that the processor can guess it. And a stack for the
+//! deepest tree takes as long to zero as a node to test: a ray begins on a short one, and [resumes](Resume) on a
+//! larger one if that is full.
 
 use core::hint::black_box;
 
