@@ -111,7 +111,7 @@ impl Flavour {
 /// A static library as a debug build makes it.
 #[derive(Debug)]
 pub struct DebugBuild {
-    /// Its path.
+    /// The path of the library.
     pub library: PathBuf,
     /// The libraries that rustc would tell a C programmer to link, separated by spaces.
     pub links: String,
