@@ -12,49 +12,53 @@ use super::node::WIDTH;
 use super::slab::Slab;
 use super::walk::flips_of;
 use crate::aabb::{Aabb, greater, lesser};
-use crate::eight::{RowBytes, first_eight, join, load, transpose};
+use crate::eight::{RowBytes, join, load, transpose};
 use crate::extremes::Extremes;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{BOX_BYTES, TriangleMesh};
+use crate::ray::INVALID_ID;
 
-/// The least and the greatest corners of the boxes of a leaf; the last box again where there are fewer than
-/// eight.
+/// The least and the greatest corners of the boxes of a leaf. Lanes that are not used have corners of others.
 #[inline(always)]
 pub(super) fn boxes_of_leaf<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     ids: &[u32],
 ) -> ([f32x8<S>; 3], [f32x8<S>; 3]) {
-    let [a, b, c, d, e, f, g, h] = first_eight(ids);
-    let (one, other) = four(simd, mesh, [a, b, c, d]);
-    let (one_behind, other_behind) = four(simd, mesh, [e, f, g, h]);
-    let ([a, b, c], [d, e, f]) = (join(one, one_behind), join(other, other_behind));
+    let first = four(simd, mesh, ids);
+    // Most leaves have few shapes: read no others.
+    let ([a, b, c], [d, e, f]) = match ids.get(WIDTH / 2..) {
+        Some(rest) if !rest.is_empty() => {
+            let last = four(simd, mesh, rest);
+            (join(first.0, last.0), join(first.1, last.1))
+        }
+        _ => (join(first.0, first.0), join(first.1, first.1)),
+    };
     // Corners may come in any order.
     ([a.lesser(d), b.lesser(e), c.lesser(f)], [a.greater(d), b.greater(e), c.greater(f)])
 }
 
-/// The two corners of four boxes.
+/// The two corners of the first four boxes; of the last again where there are fewer.
 #[inline(always)]
-fn four<S: Simd>(
-    simd: S,
-    mesh: &TriangleMesh<'_>,
-    [a, b, c, d]: [u32; 4],
-) -> ([f32x4<S>; 3], [f32x4<S>; 3]) {
-    let ([a, e], [b, f], [c, g], [d, h]) =
-        (rows(mesh, a), rows(mesh, b), rows(mesh, c), rows(mesh, d));
-    let [x, y, z, _] = transpose([load(simd, &a), load(simd, &b), load(simd, &c), load(simd, &d)]);
-    let [_, far_x, far_y, far_z] =
-        transpose([load(simd, &e), load(simd, &f), load(simd, &g), load(simd, &h)]);
+fn four<S: Simd>(simd: S, mesh: &TriangleMesh<'_>, ids: &[u32]) -> ([f32x4<S>; 3], [f32x4<S>; 3]) {
+    let wide = mesh.wide();
+    let last = ids.len().saturating_sub(1);
+    let rows = |place: usize| {
+        let id = ids.get(place.min(last)).copied().unwrap_or(INVALID_ID);
+        let sides = wide.sides(id).or_else(|| mesh.box_bytes(id)).unwrap_or(&[0; BOX_BYTES]);
+        let [first, last] = box_rows(sides);
+        (load(simd, &first), load(simd, &last))
+    };
+    let (a, b, c, d) = (rows(0), rows(1), rows(2), rows(3));
+    let [x, y, z, _] = transpose([a.0, b.0, c.0, d.0]);
+    let [_, far_x, far_y, far_z] = transpose([a.1, b.1, c.1, d.1]);
     ([x, y, z], [far_x, far_y, far_z])
 }
 
-/// A box as two rows of four numbers that overlap: x y z X and z X Y Z. Zeros where there is no such box.
+/// A box as two rows of four numbers that overlap: x y z X and z X Y Z.
 #[inline(always)]
-fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [RowBytes; 2] {
-    let Some(bytes) = mesh.box_bytes(id) else { return [[0; 16]; 2] };
-    let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) else {
-        return [[0; 16]; 2];
-    };
-    [*first, *last]
+fn box_rows(sides: &[u8; BOX_BYTES]) -> [RowBytes; 2] {
+    let rows = sides.first_chunk().zip(sides.last_chunk());
+    rows.map_or([[0; 16]; 2], |(first, last)| [*first, *last])
 }
 
 /// 2^-40.

@@ -10,7 +10,7 @@
 use glam::{Vec3A, Vec4};
 use zerocopy::transmute;
 
-use super::{IndexLayout, IndexType, Strided, TriangleMesh};
+use super::{BOX_BYTES, IndexLayout, IndexType, Strided, TriangleMesh};
 
 /// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
 ///
@@ -60,6 +60,12 @@ impl<'a> WideMesh<'a> {
         Some([corners(0)?, corners(1)?, corners(2)?, corners(3)?])
     }
 
+    /// The six numbers of a box. `None` does not mean that there is no such box: some layouts are not read this way.
+    #[inline(always)]
+    pub(crate) fn sides(&self, id: u32) -> Option<&'a [u8; BOX_BYTES]> {
+        element(self.positions, self.position_stride, id)
+    }
+
     /// Vertices, each with the four bytes behind it.
     #[inline(always)]
     fn vertices(&self, stride: u16, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
@@ -77,7 +83,9 @@ impl<'a> TriangleMesh<'a> {
             (
                 Ok(position_stride),
                 Ok(index_stride),
-                IndexLayout::Indexed(IndexType::U32) | IndexLayout::Packed(_),
+                IndexLayout::Indexed(IndexType::U32)
+                | IndexLayout::Packed(_)
+                | IndexLayout::Boxes(_),
             ) => WideMesh {
                 positions: self.positions.bytes,
                 indices: self.indices.bytes,

@@ -209,6 +209,9 @@ pub(super) struct ObjectRay {
 /// From 2^29 extents away, f64 rounding moves an origin by 2^-23 extent; [`GROWTH`] covers 2^-19, the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
 
+/// A direction that is smaller on an axis is parallel to the sides of boxes there.
+const PARALLEL: f64 = 1e-100;
+
 impl ObjectRay {
     /// No ray: fills the places of a group.
     pub(super) const NONE: Self = {
@@ -225,7 +228,8 @@ impl ObjectRay {
         // Neither zero nor NaN nor beyond what can be divided by.
         let is_ray = (1e-300..1e300).contains(&longest);
         is_ray.then(|| {
-            let unit = 1.0 / scale;
+            // One over the power of two, without a division.
+            let unit = f64::from_bits((2046 << 52) - exponent);
             let direction = line.direction.map(|d| d * unit);
             Self { line: LineF64 { direction, ..*line }, scale, shift: 0.0 }
         })
@@ -266,8 +270,9 @@ impl ObjectRay {
             let direction = self.line.direction[axis];
             let away = center[axis] - self.line.origin[axis];
             let (low, high) = (away - half[axis], away + half[axis]);
-            if direction.abs() > 0.0 {
-                let (a, b) = (low / direction, high / direction);
+            if direction.abs() > PARALLEL {
+                let inverse = 1.0 / direction;
+                let (a, b) = (low * inverse, high * inverse);
                 near = greater(near, lesser(a, b));
                 far = lesser(far, greater(a, b));
             } else if low > 0.0 || high < 0.0 {
