@@ -182,7 +182,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
                     let boxes = WideBoxes::decode(simd, node, rays.center, rays.growth);
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
-                    met.meet(simd, &boxes, rays, &beam, mask, node.used());
+                    met.meet(simd, &boxes, rays, &beam, mask, node.used(), !L::IS_ANY);
                     let Met { rays: by, near, .. } = &met;
                     let mut slots = met.slots;
                     // Push what is met, the nearest last.
@@ -235,8 +235,9 @@ pub(super) struct Met {
 impl Met {
     pub(super) const NONE: Self = Self { slots: 0, rays: [0; WIDTH], near: [0.0; WIDTH] };
 
-    /// Intersects some rays of a group with the boxes that are used.
+    /// Intersects some rays of a group with the boxes that are used; finds the entry distances only if they matter.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
     pub(super) fn meet<S: Simd>(
         &mut self,
         simd: S,
@@ -245,6 +246,7 @@ impl Met {
         beam: &Beam<S>,
         mask: u64,
         used: u32,
+        wants_near: bool,
     ) {
         let count = mask.count_ones();
         let (mut some, mut all, mut enter) = (used, 0, f32x8::splat(simd, 0.0));
@@ -258,9 +260,9 @@ impl Met {
         // takes one test for every sixteen rays, which counts as two.
         let unsure = some & !all;
         if count <= octets(mask) * unsure.count_ones() {
-            one_by_one(simd, boxes, rays, mask, self);
+            one_by_one(simd, boxes, rays, mask, wants_near, self);
         } else {
-            side_by_side(simd, boxes, rays, mask, unsure, self);
+            side_by_side(simd, boxes, rays, mask, unsure, wants_near, self);
         }
         self.add_all(all, mask, enter);
         self.slots &= some;
@@ -288,6 +290,7 @@ fn one_by_one<S: Simd>(
     boxes: &WideBoxes<f32x8<S>>,
     rays: &Rays,
     mask: u64,
+    wants_near: bool,
     met: &mut Met,
 ) {
     let zero = u32x8::splat(simd, 0);
@@ -301,7 +304,9 @@ fn one_by_one<S: Simd>(
             rest &= rest - 1;
             let (near, met) = boxes.meet(simd, &rays.slab(simd, first + bit));
             *met_by |= met.select(u32x8::splat(simd, 1 << bit), zero);
-            least = least.lesser(met.select(near, far_away));
+            if wants_near {
+                least = least.lesser(met.select(near, far_away));
+            }
         }
     }
     let slots = !(halves[0] | halves[1]).simd_eq(zero);
@@ -310,7 +315,10 @@ fn one_by_one<S: Simd>(
     for ((mask, low), high) in masks.iter_mut().zip(low).zip(high) {
         *mask = u64::from(low) | u64::from(high) << 32;
     }
-    (met.slots, met.rays, met.near) = (bits(slots), masks, least.into());
+    (met.slots, met.rays) = (bits(slots), masks);
+    if wants_near {
+        met.near = least.into();
+    }
 }
 
 /// Intersects rays with the boxes of a node that their beam did not decide, box by box: sixteen rays at a time.
@@ -321,6 +329,7 @@ fn side_by_side<S: Simd>(
     rays: &Rays,
     mask: u64,
     unsure: u32,
+    wants_near: bool,
     met: &mut Met,
 ) {
     let far_away = f32x16::splat(simd, f32::INFINITY);
@@ -341,9 +350,14 @@ fn side_by_side<S: Simd>(
             // Mask afterwards: an invalid ray has NaN distances and would count as a hit.
             let is_met = is_met & mask32x16::from_bitmask(simd, of_sixteen);
             by |= is_met.to_bitmask() << (16 * which);
-            least = least.lesser(is_met.select(near, far_away));
+            if wants_near {
+                least = least.lesser(is_met.select(near, far_away));
+            }
         }
-        (met.rays[slot], met.near[slot]) = (by, least.reduce_min());
+        met.rays[slot] = by;
+        if wants_near {
+            met.near[slot] = least.reduce_min();
+        }
         met.slots |= u32::from(by != 0) << slot;
     }
 }

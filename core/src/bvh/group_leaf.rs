@@ -172,7 +172,7 @@ impl Leaves for BoxLeaves<'_, '_> {
         let boxes = WideBoxes::of_leaf(simd, mesh, ids, rays.center, growth);
         let used = (1_u32 << ids.len().min(8)) - 1;
         let mut met = Met::NONE;
-        met.meet(simd, &boxes, rays, beam, mask, used);
+        met.meet(simd, &boxes, rays, beam, mask, used, true);
         let Met { mut slots, rays: by, near } = met;
         while slots != 0 {
             let slot = nearest_of(slots, &near) % by.len();
