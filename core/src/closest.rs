@@ -50,8 +50,13 @@ impl ClosestPoint {
     /// ```
     #[must_use]
     pub fn on_triangle(triangle: &Triangle, primitive: u32, point: [f32; 3]) -> Option<Self> {
-        Aabb::of(triangle.map(Vec3A::from_array))?;
-        let [a, b, c] = triangle.map(|corner| DVec3::from_array(corner.map(f64::from)));
+        Self::on_corners(triangle.map(Vec3A::from_array), primitive, point)
+    }
+
+    #[inline(always)]
+    fn on_corners(corners: [Vec3A; 3], primitive: u32, point: [f32; 3]) -> Option<Self> {
+        Aabb::of(corners)?;
+        let [a, b, c] = [corners[0].as_dvec3(), corners[1].as_dvec3(), corners[2].as_dvec3()];
         let p = DVec3::from_array(point.map(f64::from));
         let [v, w] = weights(a, b - a, c - a, p);
         let closest = a + (b - a) * v + (c - a) * w;
@@ -71,8 +76,8 @@ impl ClosestPoint {
     #[inline]
     fn offer(&mut self, id: u32, point: [f32; 3], selection: &Selection<'_>) {
         if selection.has(id)
-            && let Some(triangle) = selection.mesh.triangle(id)
-            && let Some(found) = Self::on_triangle(&triangle, id, point)
+            && let Some(corners) = selection.mesh.corners(id)
+            && let Some(found) = Self::on_corners(corners, id, point)
             && found.is_closer(self)
         {
             *self = found;

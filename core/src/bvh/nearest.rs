@@ -4,7 +4,8 @@
 //! node = root
 //! loop: bound the distances from the point to the eight boxes of the node
 //!       descend into the nearest child within reach, push the others
-//!       a leaf: bound the distances to its triangles at once, test those within reach in f64, nearest first
+//!       a leaf of one triangle: test it in f64
+//!       another: bound the distances to its triangles at once, test those within reach in f64, nearest first
 //!       pop what is still within reach
 //! ```
 //!
@@ -230,21 +231,26 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     let ids = bvh.leaf(first, count);
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
-                    let lanes = bvh.lanes(first, ids);
-                    let eight = Eight::of(simd, mesh, lanes, ids.len());
-                    let away = triangles(simd, &eight.corners, &point);
-                    let mut rest = !bits(away.simd_gt(f32x8::splat(simd, reach))) & eight.used;
-                    let away: [f32; WIDTH] = away.into();
-                    while rest != 0 {
-                        // The nearest first: it may show that the others are too far.
-                        let lane = nearest_of(rest, &away);
-                        rest &= !(1 << lane);
-                        // Continue, do not break: a lane whose bound is NaN must be tested, too.
-                        if away[lane % WIDTH] > reach {
-                            continue;
-                        }
-                        let Some(&id) = ids.get(lane) else { break };
+                    if let &[id] = ids {
+                        // The bounds of a leaf cost as much as the test of one triangle.
                         reach = point.reach(test(id));
+                    } else {
+                        let lanes = bvh.lanes(first, ids);
+                        let eight = Eight::of(simd, mesh, lanes, ids.len());
+                        let away = triangles(simd, &eight.corners, &point);
+                        let mut rest = !bits(away.simd_gt(f32x8::splat(simd, reach))) & eight.used;
+                        let away: [f32; WIDTH] = away.into();
+                        while rest != 0 {
+                            // The nearest first: it may show that the others are too far.
+                            let lane = nearest_of(rest, &away);
+                            rest &= !(1 << lane);
+                            // Continue, do not break: a lane whose bound is NaN must be tested, too.
+                            if away[lane % WIDTH] > reach {
+                                continue;
+                            }
+                            let Some(&id) = ids.get(lane) else { break };
+                            reach = point.reach(test(id));
+                        }
                     }
                 }
             }
