@@ -74,7 +74,7 @@ fn interleaved_rays_agree_with_each_alone() {
     let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
     let grid = owned.open(&view).unwrap();
     let rays = rays();
-    for ray in rays.iter().step_by(1200) {
+    for ray in rays.iter().step_by(600) {
         oracle::check(&grid, ray);
     }
     let alone = |options: &mut QueryOptions<'_>| -> Vec<Hit> {

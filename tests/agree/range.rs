@@ -172,7 +172,7 @@ fn ends_next_to_the_plane(rounds: usize) {
     }
     let Seen { hits, before, behind, close } = seen;
     assert!(
-        hits.min(before) > 3 * rounds && behind > rounds && close > 6 * rounds,
+        3 * hits.min(before) > 10 * rounds && 3 * behind > 4 * rounds && 3 * close > 20 * rounds,
         "{hits} {before} {behind} {close}"
     );
 }

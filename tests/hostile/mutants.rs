@@ -30,7 +30,7 @@ fn edit(random: &mut Random, words: usize) -> Edit {
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn accepted_mutants_answer_right() {
-    let count = setting("HGRID_MUTANTS", rounds(20_000) as u64);
+    let count = setting("HGRID_MUTANTS", rounds(50_000) as u64);
     let mut random = Random(setting("HGRID_SEED", 1));
     let seeds: Vec<&Seed> = seeds().filter(|seed| seed.blob.len() < 20_000).collect();
     let mut accepted = [0_u64; Method::ALL.len()];

@@ -10,7 +10,7 @@ use hgrid_tests::{rounds, setting};
 
 /// Returns the number of mutants of each kind of scene.
 fn mutants() -> u64 {
-    setting("HGRID_MUTANTS", rounds(20_000) as u64) / 20
+    setting("HGRID_MUTANTS", rounds(50_000) as u64) / 20
 }
 
 fn rays() -> Vec<RayF64> {
