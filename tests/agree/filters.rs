@@ -217,12 +217,24 @@ fn masks(count: u32) -> Vec<u32> {
 
 #[test]
 fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
+    a_filter_is_asked_in_order(3);
+}
+
+#[test]
+#[ignore = "slow: all options with all methods"]
+fn a_filter_is_asked_in_order_with_all_options() {
+    a_filter_is_asked_in_order(1);
+}
+
+/// Takes every `share`th choice of options, others for the next method and the next rays.
+fn a_filter_is_asked_in_order(share: usize) {
     let mesh = scene();
     let masks = masks(mesh.view().triangle_count());
     let with_masks = mesh.view().with_masks(Strided::new(&masks)).unwrap();
     // Without masks the filter is asked about every triangle or none, so trees are enough here.
     let trees = methods::configs().filter(|config| config.method() == Method::Bvh);
     let plain = trees.map(|config| (config, mesh.view()));
+    let mut turns = (0..share).cycle();
     for (config, view) in methods::configs().map(|config| (config, with_masks)).chain(plain) {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
@@ -231,7 +243,8 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
         for rays in [tiles, scattered(1200, 2)] {
             let truth = Truth::of(&grid, &rays);
             let first = truth.culling(Cull::None).into_iter().flatten().next().expect("some hit");
-            for asked in choices(first.primitive) {
+            let turn = turns.next().expect("it has no end");
+            for asked in choices(first.primitive).into_iter().skip(turn).step_by(share) {
                 let hits = truth.there(&view, asked);
                 for (ray, hits) in rays.iter().zip(&hits).step_by(5) {
                     check_single(&grid, ray, hits, asked);

@@ -53,10 +53,20 @@ fn check_filter(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
 
 #[test]
 fn every_query_agrees_with_brute_force_next_to_flat_meshes() {
+    agrees_next_to_flat_meshes(75);
+}
+
+#[test]
+#[ignore = "slow: brute force over many meshes"]
+fn every_query_agrees_with_brute_force_next_to_more_flat_meshes() {
+    agrees_next_to_flat_meshes(300);
+}
+
+fn agrees_next_to_flat_meshes(rounds: usize) {
     let high = Config::from(Parameters::Bvh { quality: Quality::High });
     let mut random = Random(17);
     let mut hits = 0;
-    for round in 0..300 {
+    for round in 0..rounds {
         let axis = round % 3;
         let mesh = flat(&mut random, axis);
         let mesh = mesh.view();
@@ -82,7 +92,7 @@ fn every_query_agrees_with_brute_force_next_to_flat_meshes() {
             }
         }
     }
-    assert!(hits > 5000, "{hits} hits");
+    assert!(3 * hits > 50 * rounds, "{hits} hits");
 }
 
 #[test]

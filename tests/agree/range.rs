@@ -128,10 +128,20 @@ fn around(t: &BigRational) -> [f32; 3] {
 
 #[test]
 fn ends_next_to_the_plane_are_decided_exactly_at_every_scale() {
+    ends_next_to_the_plane(400);
+}
+
+#[test]
+#[ignore = "slow: a hundred thousand exact fractions"]
+fn ends_next_to_the_planes_of_more_triangles_are_decided_exactly() {
+    ends_next_to_the_plane(1500);
+}
+
+fn ends_next_to_the_plane(rounds: usize) {
     let mut random = Random(17);
     let mut seen = Seen::default();
     for scale in [1.0, 1e-30, 1e-10, 1e10, 1e30] {
-        for round in 0..1500 {
+        for round in 0..rounds {
             let triangle = triangle(&mut random, round);
             let (u, v) = (random.unit(), random.unit());
             let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
@@ -162,7 +172,7 @@ fn ends_next_to_the_plane_are_decided_exactly_at_every_scale() {
     }
     let Seen { hits, before, behind, close } = seen;
     assert!(
-        hits > 5000 && before > 5000 && behind > 2000 && close > 10_000,
+        3 * hits.min(before) > 10 * rounds && 3 * behind > 4 * rounds && 3 * close > 20 * rounds,
         "{hits} {before} {behind} {close}"
     );
 }

@@ -54,9 +54,9 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
     prop::collection::vec(ray, 1..30)
 }
 
-/// Returns the number of cases: `PROPTEST_CASES`, or as many as take some seconds.
+/// Returns the number of cases: `PROPTEST_CASES`, or as many as take a second or two.
 fn cases() -> u32 {
-    setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("a count that fits")
+    setting("PROPTEST_CASES", rounds(375) as u64).try_into().expect("a count that fits")
 }
 
 proptest! {

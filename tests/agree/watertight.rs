@@ -45,15 +45,25 @@ fn assert_watertight(mesh: &Mesh, origin: [f32; 3], rays: usize) {
 
 #[test]
 fn cubes_and_balls_have_no_leaks_at_any_scale_or_place() {
+    cubes_and_balls_have_no_leaks(&[1.0, 1e-30], &[30_000.0]);
+}
+
+#[test]
+#[ignore = "slow: a hundred grids"]
+fn cubes_and_balls_have_no_leaks_at_more_scales_and_places() {
+    cubes_and_balls_have_no_leaks(&[1e-20, 3e7, 1e30], &[1.0, 100.0]);
+}
+
+fn cubes_and_balls_have_no_leaks(scales: &[f32], shifts: &[f32]) {
     for roundness in [0.0, 1.0] {
         let mesh = ball(24, roundness);
-        for scale in [1.0, 1e-30, 1e-20, 3e7, 1e30] {
+        for &scale in scales {
             let origin = [0.11, -0.07, 0.3].map(|c| c * scale);
-            assert_watertight(&mesh.scaled(scale), origin, rounds(5000));
+            assert_watertight(&mesh.scaled(scale), origin, rounds(1250));
         }
-        for shift in [1.0, 100.0, 30_000.0] {
+        for &shift in shifts {
             let mesh = mesh.map(|p| p.map(|c| c + shift));
-            assert_watertight(&mesh, [0.11 + shift, shift - 0.07, 0.3 + shift], rounds(5000));
+            assert_watertight(&mesh, [0.11 + shift, shift - 0.07, 0.3 + shift], rounds(1250));
         }
     }
 }
@@ -62,8 +72,8 @@ fn cubes_and_balls_have_no_leaks_at_any_scale_or_place() {
 fn a_cube_of_two_triangles_a_side_has_no_leaks() {
     let mesh = ball(1, 0.0);
     assert_eq!(mesh.indices.len(), 12);
-    assert_watertight(&mesh, [0.0; 3], rounds(5000));
-    assert_watertight(&mesh, [0.5, -0.25, 0.75], rounds(5000));
+    assert_watertight(&mesh, [0.0; 3], rounds(1250));
+    assert_watertight(&mesh, [0.5, -0.25, 0.75], rounds(1250));
 }
 
 #[test]
@@ -75,7 +85,7 @@ fn a_surface_like_a_scan_has_no_leaks() {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
         let origin = inside(&grid).expect("a closed surface has an inside");
-        assert_eq!(leaks(&grid, &mesh, origin, rounds(50_000), 5), 0, "{config:?}");
+        assert_eq!(leaks(&grid, &mesh, origin, rounds(12_500), 5), 0, "{config:?}");
     }
 }
 

@@ -122,25 +122,34 @@ type Asker<'f> = (Option<Command>, &'static str, &'f [&'static str]);
 #[test]
 fn rust_c_and_cpp_answer_as_brute_force_does() {
     let sanitized: Vec<_> = SANITIZERS.into_iter().chain(["-O1"]).collect();
-    all_answer([
-        (Some(compiler("c99")), "answers.c", &sanitized),
-        (cpp_compiler("c++17"), "answers.cpp", &sanitized),
-    ]);
+    all_answer(
+        false,
+        [
+            (Some(compiler("c99")), "answers.c", &sanitized),
+            (cpp_compiler("c++17"), "answers.cpp", &sanitized),
+        ],
+    );
 }
 
 #[test]
-#[ignore = "slow: half a million questions to each of three more programs"]
-fn other_compilers_answer_as_brute_force_does() {
-    all_answer([
-        (cpp_compiler("c++17"), "answers.c", &["-O2"]),
-        (clang("c17"), "answers.c", &["-O2"]),
-        (clang("c++20"), "answers.cpp", &["-O2", "-fno-exceptions", "-fno-rtti"]),
-    ]);
+#[ignore = "slow: half a million questions to each of five programs"]
+fn all_compilers_answer_as_brute_force_does() {
+    let sanitized: Vec<_> = SANITIZERS.into_iter().chain(["-O1"]).collect();
+    all_answer(
+        true,
+        [
+            (Some(compiler("c99")), "answers.c", &sanitized),
+            (cpp_compiler("c++17"), "answers.cpp", &sanitized),
+            (cpp_compiler("c++17"), "answers.c", &["-O2"]),
+            (clang("c17"), "answers.c", &["-O2"]),
+            (clang("c++20"), "answers.cpp", &["-O2", "-fno-exceptions", "-fno-rtti"]),
+        ],
+    );
 }
 
-/// Compiles and runs the programs for which there is a compiler.
-fn all_answer<const N: usize>(askers: [Asker<'_>; N]) {
-    let cases = cases();
+/// Compiles and runs the programs for which there is a compiler, about the whole table or a part of it.
+fn all_answer<const N: usize>(is_whole: bool, askers: [Asker<'_>; N]) {
+    let cases = cases(is_whole);
     let dir = TempDir::new().expect("a folder");
     let table = dir.path().join("table");
     fs::write(&table, bytes(&cases, built)).expect("a file");
@@ -152,5 +161,6 @@ fn all_answer<const N: usize>(askers: [Asker<'_>; N]) {
     // Without another compiler there are no counts.
     let Some(&all) = counts.first() else { return };
     // Every program compared all answers.
-    assert!(all > 500_000 && counts.iter().all(|&count| count == all), "{counts:?}");
+    let least = if is_whole { 500_000 } else { 250_000 };
+    assert!(all > least && counts.iter().all(|&count| count == all), "{counts:?}");
 }

@@ -78,11 +78,11 @@ impl Case {
     }
 
     /// Makes the queries of a mesh and answers them.
-    fn new(mesh: Mesh, has_masks: bool, seed: u64) -> Self {
+    fn new(mesh: Mesh, has_masks: bool, seed: u64, configs: &[Config]) -> Self {
         let mut random = Random(seed);
         let masks = if has_masks { (0..).take(mesh.indices.len()).collect() } else { Vec::new() };
         let (rays, points) = (rays(&mesh, &mut random), points(&mesh, &mut random));
-        let configs = Method::ALL.iter().copied().map(Config::new).chain(configs()).collect();
+        let configs = configs.to_vec();
         let mut case = Self { mesh, masks, configs, rays, groups: Vec::new(), points: Vec::new() };
 
         // The grid only tells the mesh's bounds, and skips triangles that are not finite.
@@ -204,16 +204,18 @@ fn damaged() -> Mesh {
     mesh
 }
 
-/// Returns the table.
-pub(crate) fn cases() -> Vec<Case> {
+/// Returns the table: of all configurations, or of one for each method and quality.
+pub(crate) fn cases(is_whole: bool) -> Vec<Case> {
+    let more = Method::ALL.iter().copied().map(Config::new).filter(|_| is_whole);
+    let configs: Vec<_> = more.chain(configs()).collect();
     vec![
-        Case::new(Mesh::default(), false, 1),
-        Case::new(one_triangle(), true, 2),
-        Case::new(ball(12, 1.0), true, 3),
-        Case::new(soup(1500, 0.1, 1), false, 4),
-        Case::new(soup(150, 2.0, 2), true, 5),
-        Case::new(stack(), true, 6),
-        Case::new(damaged(), true, 7),
+        Case::new(Mesh::default(), false, 1, &configs),
+        Case::new(one_triangle(), true, 2, &configs),
+        Case::new(ball(12, 1.0), true, 3, &configs),
+        Case::new(soup(1500, 0.1, 1), false, 4, &configs),
+        Case::new(soup(150, 2.0, 2), true, 5, &configs),
+        Case::new(stack(), true, 6, &configs),
+        Case::new(damaged(), true, 7, &configs),
     ]
 }
 

@@ -3,23 +3,18 @@
 //! the header's comments.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_tests::artefact::{Flavour, run};
+use hgrid_tests::artefact::Flavour;
 
 use crate::header::{documentation, functions, parameters, statuses, structs};
 use crate::left_out;
-use crate::programs::plain;
+use crate::programs;
 
 /// Returns the rest of each line that starts with a word, over the output of all programs.
 fn printed(word: &str) -> BTreeSet<&'static str> {
     static PRINTED: OnceLock<String> = OnceLock::new();
-    let all = PRINTED.get_or_init(|| {
-        let print = |program| run(&mut Command::new(program)).stdout;
-        let all = plain().flat_map(|(program, _)| print(program)).collect();
-        String::from_utf8(all).expect("text") + left_out::printed()
-    });
+    let all = PRINTED.get_or_init(|| programs::printed().to_owned() + left_out::printed());
     all.lines().filter_map(|line| line.strip_prefix(word)?.strip_prefix(' ')).collect()
 }
 

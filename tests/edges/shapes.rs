@@ -21,7 +21,7 @@ fn agrees(mesh: &Mesh) {
     let grids: Vec<Grid<'_>> = owned.iter().map(|owned| owned.open(&view).unwrap()).collect();
     let (min, max) = grids[0].bounds();
     let mut random = Random(43);
-    for i in 0..rounds(50) {
+    for i in 0..rounds(13) {
         let mut point = |reach: f32| -> [f32; 3] {
             std::array::from_fn(|k| {
                 let half = max[k] / 2.0 - min[k] / 2.0;

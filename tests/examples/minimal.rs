@@ -1,5 +1,7 @@
 //! The smallest example, and the Makefile that builds all of them.
 
+use std::ffi::OsStr;
+use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::{root, run, target_dir};
@@ -23,22 +25,38 @@ fn minimal_prints_its_hit() {
     assert_eq!(String::from_utf8(output.stdout).as_deref(), Ok(PRINTED));
 }
 
-#[test]
-fn the_makefile_builds_and_runs_all() {
-    if !is_installed("make") {
-        return;
-    }
-    let dir = TempDir::new().expect("a folder");
+/// Returns a command that makes targets in a folder.
+fn make(targets: &[&OsStr], dir: &Path) -> Command {
     let mut make = command("make");
-    make.arg("-C").arg(root().join("c_examples")).arg("run");
+    make.arg("-C").arg(root().join("c_examples")).args(targets);
     // Remove variables that an outer make or cargo may have set. With other flags, cargo would replace the library
     // that other tests link.
     for name in ["MAKEFLAGS", "MAKELEVEL", "CFLAGS", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         make.env_remove(name);
     }
-    make.env("CARGO_TARGET_DIR", target_dir())
-        .env("BUILD", dir.path())
-        .env("CARGO_NET_OFFLINE", "true");
+    make.env("CARGO_TARGET_DIR", target_dir()).env("BUILD", dir).env("CARGO_NET_OFFLINE", "true");
+    make
+}
+
+#[test]
+fn the_makefile_builds_an_example() {
+    if is_installed("make") {
+        let dir = TempDir::new().expect("a folder");
+        let program = dir.path().join("minimal");
+        run(&mut make(&[program.as_os_str()], dir.path()));
+        let printed = run(&mut Command::new(program)).stdout;
+        assert_eq!(String::from_utf8(printed).as_deref(), Ok(PRINTED));
+    }
+}
+
+#[test]
+#[ignore = "slow: compiles all examples and draws large pictures"]
+fn the_makefile_builds_and_runs_all() {
+    if !is_installed("make") {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let mut make = make(&["run".as_ref()], dir.path());
     let [has_cpp, has_mpi] = ["c++", "mpi"].map(is_installed);
     for (has, name) in [(has_cpp, "CXX"), (has_mpi, "MPICC")] {
         if !has {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 use hgrid_tests::artefact::{output, root, run, warnings};
 use hgrid_tests::tools::{command, is_installed};
@@ -11,14 +12,16 @@ use tempfile::TempDir;
 use crate::pictures::ascii;
 use crate::programs::{drawing, link, printed, raytracer};
 
-/// Builds the program, if there is an MPI.
-fn mpi(dir: &Path) -> Option<PathBuf> {
-    if !is_installed("mpi") {
-        return None;
-    }
-    let program = dir.join("mpi");
-    link(warnings(command("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], &program);
-    Some(program)
+/// Builds the program once, if there is an MPI.
+fn mpi() -> Option<&'static Path> {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    is_installed("mpi").then(|| {
+        &**PROGRAM.get_or_init(|| {
+            let program = TempDir::new().expect("a folder").keep().join("mpi");
+            link(warnings(command("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], &program);
+            program
+        })
+    })
 }
 
 /// Returns a command that runs `count` ranks on this machine, with any number of cores and as any user.
@@ -36,9 +39,9 @@ fn ranks(count: u32, program: &Path) -> Command {
 #[test]
 fn four_ranks_draw_the_picture_of_one() {
     let dir = TempDir::new().expect("a folder");
-    let Some(program) = mpi(dir.path()) else { return };
+    let Some(program) = mpi() else { return };
     let [together, alone] = ["together.ppm", "alone.ppm"].map(|name| dir.path().join(name));
-    let said = printed(ranks(4, &program).args(["--size", "300", "-o"]).arg(&together));
+    let said = printed(ranks(4, program).args(["--size", "300", "-o"]).arg(&together));
     assert!(said.contains("for 500000 triangles\n"), "{said}");
     assert!(said.contains("ranks: 4\n"), "{said}");
     assert!(said.contains("picture of one process: the same, byte by byte\n"), "{said}");
@@ -50,11 +53,11 @@ fn four_ranks_draw_the_picture_of_one() {
 #[test]
 fn any_number_of_ranks_draws_any_scene() {
     let dir = TempDir::new().expect("a folder");
-    let Some(program) = mpi(dir.path()) else { return };
+    let Some(program) = mpi() else { return };
     let [scene, picture] = ["house.ply", "picture.ppm"].map(|name| dir.path().join(name));
     fs::write(&scene, ascii()).expect("a file");
     for (count, size) in [(1, "20"), (3, "20"), (4, "5")] {
-        run(ranks(count, &program).arg(&scene).args(["--size", size, "-o"]).arg(&picture));
+        run(ranks(count, program).arg(&scene).args(["--size", size, "-o"]).arg(&picture));
         let expected = dir.path().join("expected.ppm");
         run(raytracer().arg(&scene).args(["--size", size, "--shadows", "-o"]).arg(&expected));
         let [drawn, expected] = [&picture, &expected].map(|path| fs::read(path).expect("a file"));
@@ -65,8 +68,7 @@ fn any_number_of_ranks_draws_any_scene() {
 /// The rank that finds an error ends the others.
 #[test]
 fn errors_end_all_ranks() {
-    let dir = TempDir::new().expect("a folder");
-    let Some(program) = mpi(dir.path()) else { return };
+    let Some(program) = mpi() else { return };
     for (words, message) in [
         (&["--fast"][..], "mpi: unknown option --fast: mpi --help names all of them\n"),
         (&["a.ply", "b.ply"], "mpi: one scene at a time: a.ply or b.ply?\n"),
@@ -74,7 +76,7 @@ fn errors_end_all_ranks() {
         (&["no/such.ply"], "mpi: no/such.ply: cannot be opened\n"),
         (&["-o", "no/such/folder/a.ppm"], "mpi: no/such/folder/a.ppm: cannot be written\n"),
     ] {
-        let output = output(ranks(2, &program).args(words));
+        let output = output(ranks(2, program).args(words));
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success() && said.contains(message), "{words:?}: {said}");
     }

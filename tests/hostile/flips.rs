@@ -49,7 +49,7 @@ struct Ends {
 }
 
 /// The distance from one flipped bit to the next.
-const STEP: usize = 13;
+const STEP: usize = 29;
 
 fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
     let view = seed.mesh.view();
@@ -217,13 +217,24 @@ fn flip_meshes(step: usize) {
     }
 }
 
-/// Flips of every bit in the header of a blob that contains its mesh, including the field for the mesh.
+/// Flips of bits in the header of a blob that contains its mesh, including the field for the mesh.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn packed_headers() {
+    flip_packed_headers(5);
+}
+
+#[test]
+#[ignore = "slow: some seconds"]
+fn every_bit_of_packed_headers() {
+    flip_packed_headers(1);
+}
+
+fn flip_packed_headers(step: usize) {
     let mut opened = 0;
     for Seed { packed, .. } in seeds() {
-        for (at, bit) in (0..CHECKSUM + 4).flat_map(|at| (0..8).map(move |bit| (at, bit))) {
+        let bits = (0..8 * (CHECKSUM + 4)).step_by(step);
+        for (at, bit) in bits.map(|bit| (bit / 8, bit % 8)) {
             let mut copy = Copy::of(packed);
             copy.set(at, &[packed[at] ^ 1 << bit]);
             assert!(Grid::open_packed(copy.bytes()).is_err(), "bit {bit} of byte {at}");
@@ -238,5 +249,5 @@ fn packed_headers() {
             }
         }
     }
-    assert!(opened > 1000, "{opened}");
+    assert!(opened > 1000 / step, "{opened}");
 }

@@ -7,7 +7,7 @@ use hgrid_tests::copy::{CHECKSUM, Copy};
 use hgrid_tests::hostile::{Edit, Seed, agrees, fixed_rays, seeds};
 use hgrid_tests::owned::prove;
 use hgrid_tests::random::Random;
-use hgrid_tests::setting;
+use hgrid_tests::{rounds, setting};
 
 /// Returns a small change: values that the blob has elsewhere, or close to the ones it has. Most such blobs open.
 fn edit(random: &mut Random, words: usize) -> Edit {
@@ -30,7 +30,7 @@ fn edit(random: &mut Random, words: usize) -> Edit {
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn accepted_mutants_answer_right() {
-    let count = setting("HGRID_MUTANTS", 200_000);
+    let count = setting("HGRID_MUTANTS", rounds(50_000) as u64);
     let mut random = Random(setting("HGRID_SEED", 1));
     let seeds: Vec<&Seed> = seeds().filter(|seed| seed.blob.len() < 20_000).collect();
     let mut accepted = [0_u64; Method::ALL.len()];

@@ -18,7 +18,7 @@ fn run(target: fn(&[u8]), rounds: usize, bytes: usize) {
 
 #[test]
 fn calls_from_c() {
-    run(c_abi, if cfg!(miri) { 60 } else { rounds(1000) }, 600);
+    run(c_abi, if cfg!(miri) { 60 } else { rounds(250) }, 600);
 }
 
 /// A number of calls that is small enough for each run of Miri.
@@ -29,5 +29,5 @@ fn a_few_calls_from_c() {
 
 #[test]
 fn meshes() {
-    run(build_mesh, if cfg!(miri) { 2 } else { rounds(500) }, 400);
+    run(build_mesh, if cfg!(miri) { 2 } else { rounds(125) }, 400);
 }

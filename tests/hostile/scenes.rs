@@ -6,7 +6,12 @@ use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
-use hgrid_tests::setting;
+use hgrid_tests::{rounds, setting};
+
+/// Returns the number of mutants of each kind of scene.
+fn mutants() -> u64 {
+    setting("HGRID_MUTANTS", rounds(50_000) as u64) / 20
+}
 
 fn rays() -> Vec<RayF64> {
     let mut random = Random(3);
@@ -51,7 +56,7 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
     assert!(expected.iter().filter(|(hit, _)| hit.is_some()).count() > 5);
     let mut random = Random(setting("HGRID_SEED", 1));
     let (mut opened, mut accepted) = (0, 0);
-    for round in 0..setting("HGRID_MUTANTS", 200_000) / 20 {
+    for round in 0..mutants() {
         let mut copy = Copy::of(bytes);
         for _ in 0..=round % 3 {
             let at = random.below(bytes.len() / 4) * 4;
@@ -83,7 +88,10 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         });
         assert!(!same || found == expected, "round {round}");
     }
-    assert!(opened > 1000 && accepted > 10, "{opened} opened, {accepted} accepted");
+    assert!(
+        opened > mutants() / 10 && accepted > mutants() / 1000,
+        "{opened} opened, {accepted} accepted"
+    );
     // All truncations are refused.
     for length in (0..bytes.len()).step_by(13) {
         let copy = Copy::of(&bytes[..length]);
@@ -117,7 +125,7 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
     let heads = heads(bytes);
     let mut random = Random(setting("HGRID_SEED", 1));
     let (mut opened, mut accepted) = (0, 0);
-    for round in 0..setting("HGRID_MUTANTS", 200_000) / 20 {
+    for round in 0..mutants() {
         let mut copy = Copy::of(bytes);
         for _ in 0..=round % 3 {
             let anywhere = random.below(bytes.len() / 4) * 4;
@@ -144,7 +152,7 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
         let is_opened = with_packed(copy.bytes(), |mutant| {
             mutant.is_ok_and(|mutant| answers(&mutant, &rays).len() == rays.len())
         });
-        opened += usize::from(is_opened);
+        opened += u64::from(is_opened);
         if prove_packed(copy.bytes()).is_err() {
             continue;
         }
@@ -159,7 +167,10 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
             }
         });
     }
-    assert!(opened > 1000 && accepted > 10, "{opened} opened, {accepted} accepted");
+    assert!(
+        opened > mutants() / 10 && accepted > mutants() / 1000,
+        "{opened} opened, {accepted} accepted"
+    );
 }
 
 #[test]

@@ -12,7 +12,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hgrid_tests::artefact::{cargo_in, run, start_with, target_dir};
+use hgrid_tests::artefact::{cargo_in, library_dir, run, start_with, target_dir};
 use hgrid_tests::readme::check_sizes;
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
@@ -71,12 +71,15 @@ fn only(method: &str) -> [&str; 3] {
 /// has a folder of its own, so that none replaces another.
 ///
 /// Other targets are built at the same time if they are installed: two tests that name each other's need one build.
-/// The dependencies are compiled once, for the choice of the quick tests.
+/// The dependencies are compiled once, for the choice of the quick tests, which starts with those of the C library.
 fn build(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
     let folder = target_dir().join("no_std");
     let dir = folder.join(arguments.last().unwrap_or(&"all"));
     let first = only("one-level");
-    if arguments != first {
+    if arguments == first {
+        // Host dependencies are compiled already, for the C library.
+        start_with(&dir.join("release"), library_dir());
+    } else {
         build(target, &[if target == BROWSER { MICROCONTROLLER } else { BROWSER }], &first);
         start_with(&dir, &folder.join(first[2]));
     }

@@ -131,6 +131,17 @@ pub fn library_with(features: &str) -> PathBuf {
     build_beside(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
 }
 
+/// Does the same with less optimisation, which takes less time.
+#[must_use]
+pub fn plain_library_with(features: &str) -> PathBuf {
+    let plain = ["hgrid-core", "hgrid-capi"]
+        .map(|package| format!("profile.release.package.{package}.opt-level=1"));
+    let [core, library] = &plain;
+    let arguments =
+        ["--no-default-features", "--features", features, "--config", core, "--config", library];
+    build_beside(&format!("{}_plain", features.replace(',', "_")), &arguments).join(STATIC_LIBRARY)
+}
+
 fn debug_build(flavour: Flavour) -> DebugBuild {
     // Both flavours share compiled dependencies, and so the path of the library.
     static TURN: Mutex<()> = Mutex::new(());

@@ -28,7 +28,7 @@ pub mod symbols;
 #[cfg(feature = "full")]
 pub mod tools;
 
-/// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/run` sets 4.
+/// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/run` sets 16.
 ///
 /// # Panics
 /// If the value is not a number.
