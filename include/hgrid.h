@@ -91,9 +91,9 @@
  * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
- *   HGRID_METHOD_BVH         the default: a tree of boxes over a grid of the triangles' centres, for rays of
- *                            every kind in scenes of every kind; what it takes at most is known from the
- *                            number of triangles
+ *   HGRID_METHOD_BVH         the default: a bounding volume hierarchy over a grid of the triangles' centres,
+ *                            for rays of every kind in scenes of every kind; what it takes at most is known
+ *                            from the number of triangles
  *   HGRID_METHOD_ONE_LEVEL   one hashed grid, the least memory on large scans; fixed and variable are
  *                            built from it
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells: the shortest time to a first image
@@ -228,7 +228,7 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan uses about half of it, and every mesh of finite triangles
+ * default configuration: a constant expression. A scan uses about six tenths of it, and every mesh of finite triangles
  * at least three tenths.
  * Where `size_t` has 32 bits the result wraps beyond 268 million triangles; `hgrid_bound` answers with an
  * error there.
@@ -340,9 +340,8 @@
  * Grids in the cells of grids, not hashed, as in the Manta ray tracer: what hashed grids are
  * compared with.
  *
- * It has the fewest ray-triangle tests, and the longest build in the most memory by far. Choose it
- * to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
- * it.
+ * Of the four grids of the paper it has the fewest ray-triangle tests, and the longest build in the most memory by
+ * far. Choose it to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to it.
  *
  * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle. The
  * exact size takes a dry run. `hgrid_sizes` without scratch answers with a bound that no mesh comes near, up to 8
@@ -351,8 +350,8 @@
 #define HGRID_METHOD_RECURSIVE 4
 
 /**
- * A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
- * to eight children with tight boxes.
+ * A bounding volume hierarchy over a grid of the triangles' centres: each triangle lies in one leaf, and a node has
+ * up to eight children with tight boxes.
  *
  * It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
  * belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
@@ -986,11 +985,11 @@ typedef struct hgrid_surface {
      */
     float normal[3];
     /**
-     * Start for rays that leave on that side: reflections, and rays to lights.
+     * Origin for rays that leave on that side: reflections, and rays to lights.
      */
     float above[3];
     /**
-     * Start for rays that go on through the triangle.
+     * Origin for rays that go on through the triangle.
      */
     float below[3];
     /**
@@ -1000,8 +999,8 @@ typedef struct hgrid_surface {
 } hgrid_surface;
 
 /**
- * Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The hint
- * changes the speed, never the answers.
+ * Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The
+ * hint changes the speed, never the answers.
  */
 typedef uint32_t hgrid_coherence;
 
@@ -1375,11 +1374,11 @@ typedef struct hgrid_scene_surface {
      */
     double position[3];
     /**
-     * Start for rays that leave on the side that the ray came from: reflections, and rays to lights.
+     * Origin for rays that leave on the side that the ray came from: reflections, and rays to lights.
      */
     double above[3];
     /**
-     * Start for rays that go on through the triangle.
+     * Origin for rays that go on through the triangle.
      */
     double below[3];
     /**
@@ -2106,9 +2105,9 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * A start lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured along
- * one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane may
- * still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
+ * An origin lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured
+ * along one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane
+ * may still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
  * length, has no normal to rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`,
  * except for triangles that the ray sees nearly edge-on.
  *
@@ -2877,9 +2876,9 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
  * other side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the
- * object sees them, may hit it, because normal and direction are rounded. A start is lifted as by
+ * object sees them, may hit it, because normal and direction are rounded. An origin is lifted as by
  * `hgrid_surface_at`, or by up to four times the rounding error of its transformation, if that is more. Do not round
- * a start to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
+ * an origin to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
  * holds here, too.
  *
  * ```c

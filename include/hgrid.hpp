@@ -1287,7 +1287,7 @@ public:
         return closest_point_in_c(from, max_distance, &with.c());
     }
 
-    /// The point where a ray met the mesh, its normal there, and starts for rays that leave it; `at` is
+    /// The point where a ray met the mesh, its normal there, and origins for rays that leave it; `at` is
     /// what a query has found for the ray.
     optional<surface> surface_at(const ray &along, const hit &at) const noexcept
     {
@@ -1975,7 +1975,7 @@ public:
     {
         return occluded_n_in_c(rays, answers, know, &with.c());
     }
-    /// The point where a ray met a triangle, its normal there, and starts for rays that leave it; `at` is
+    /// The point where a ray met a triangle, its normal there, and origins for rays that leave it; `at` is
     /// what a query has found for the ray. Nothing where `hgrid_scene_surface_at` returns false.
     optional<scene_surface> surface_at(const ray_f64 &along, const scene_hit &at) const noexcept
     {

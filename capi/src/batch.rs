@@ -85,7 +85,7 @@ pub unsafe extern "C" fn hgrid_intersect_n(
         let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |grid: &Grid<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray, hgrid_hit>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray, hgrid_hit>,
                      options: &mut QueryOptions<'_>| {
             grid.intersect_batch(rays, coherence, options);
         };
@@ -142,7 +142,7 @@ pub unsafe extern "C" fn hgrid_occluded_n(
         let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |grid: &Grid<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray, u8>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray, u8>,
                      options: &mut QueryOptions<'_>| {
             grid.occluded_batch(rays, coherence, options);
         };
@@ -181,7 +181,7 @@ pub unsafe extern "C" fn hgrid_occluder_n(
         let batch = BatchArrays::new((rays, ray_stride), (occluders, occluder_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |grid: &Grid<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray, u32>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray, u32>,
                      options: &mut QueryOptions<'_>| {
             grid.occluder_batch(rays, coherence, options);
         };

@@ -3,9 +3,9 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`
-//! and `scene_batch` hold the functions, `types`, `query_types` and `blob_types` the structs, and `raw` every use of a
-//! caller's pointer.
+//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`, `scene_batch`,
+//! `scene_surface`, `status` and `version` hold the functions, `types`, `query_types` and `blob_types` the structs,
+//! and `raw` every use of a caller's pointer.
 //!
 //! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
 //! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte

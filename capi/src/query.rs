@@ -241,9 +241,9 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// }
 /// ```
 ///
-/// A start lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured along
-/// one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane may
-/// still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
+/// An origin lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured
+/// along one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane
+/// may still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
 /// length, has no normal to rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`,
 /// except for triangles that the ray sees nearly edge-on.
 ///

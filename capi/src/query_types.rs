@@ -8,8 +8,8 @@ use hgrid_core::{ClosestPoint, Coherence, Counters, Cull, Hit, INVALID_ID, Ray, 
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
 
-/// Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The hint
-/// changes the speed, never the answers.
+/// Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The
+/// hint changes the speed, never the answers.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_coherence = u32;
 
@@ -253,9 +253,9 @@ pub struct hgrid_surface {
     pub position: [f32; 3],
     /// The triangle's normal, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
-    /// Start for rays that leave on that side: reflections, and rays to lights.
+    /// Origin for rays that leave on that side: reflections, and rays to lights.
     pub above: [f32; 3],
-    /// Start for rays that go on through the triangle.
+    /// Origin for rays that go on through the triangle.
     pub below: [f32; 3],
     /// 1 if the ray met the front, from which the vertices appear counter-clockwise; 0 if the back.
     pub is_front: u32,

@@ -67,7 +67,7 @@ pub unsafe extern "C" fn hgrid_intersect_scene_n(
         let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |scene: &Scene<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray_f64, hgrid_scene_hit>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray_f64, hgrid_scene_hit>,
                      options: &mut SceneOptions<'_>| {
             scene.intersect_batch(rays, coherence, options);
         };
@@ -104,7 +104,7 @@ pub unsafe extern "C" fn hgrid_occluded_scene_n(
         let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |scene: &Scene<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray_f64, u8>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray_f64, u8>,
                      options: &mut SceneOptions<'_>| {
             scene.occluded_batch(rays, coherence, options);
         };

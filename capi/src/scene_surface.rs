@@ -13,9 +13,9 @@ use crate::scene::{hgrid_ray_f64, hgrid_scene, hgrid_scene_hit};
 pub struct hgrid_scene_surface {
     /// The point, in the scene.
     pub position: [f64; 3],
-    /// Start for rays that leave on the side that the ray came from: reflections, and rays to lights.
+    /// Origin for rays that leave on the side that the ray came from: reflections, and rays to lights.
     pub above: [f64; 3],
-    /// Start for rays that go on through the triangle.
+    /// Origin for rays that go on through the triangle.
     pub below: [f64; 3],
     /// The triangle's normal in the scene, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
@@ -41,9 +41,9 @@ impl From<SceneSurface> for hgrid_scene_surface {
 ///
 /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
 /// other side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the
-/// object sees them, may hit it, because normal and direction are rounded. A start is lifted as by
+/// object sees them, may hit it, because normal and direction are rounded. An origin is lifted as by
 /// `hgrid_surface_at`, or by up to four times the rounding error of its transformation, if that is more. Do not round
-/// a start to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
+/// an origin to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
 /// holds here, too.
 ///
 /// ```c

@@ -315,7 +315,7 @@ pub unsafe extern "C" fn hgrid_intersect_shapes_n(
         let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |shapes: &Shapes<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray, hgrid_hit>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray, hgrid_hit>,
                      options: &mut QueryOptions<'_>,
                      test: &mut ShapeTest<'_>| {
             shapes.intersect_batch(rays, coherence, options, test);
@@ -352,7 +352,7 @@ pub unsafe extern "C" fn hgrid_occluded_shapes_n(
         let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |shapes: &Shapes<'_>,
-                     rays: &mut raw::Arrays<'_, hgrid_ray, u8>,
+                     rays: &mut raw::RunningBatch<'_, hgrid_ray, u8>,
                      options: &mut QueryOptions<'_>,
                      test: &mut ShapeTest<'_>| {
             shapes.occluded_batch(rays, coherence, options, test);

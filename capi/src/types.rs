@@ -64,17 +64,16 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// Grids in the cells of grids, not hashed, as in the Manta ray tracer: what hashed grids are
 /// compared with.
 ///
-/// It has the fewest ray-triangle tests, and the longest build in the most memory by far. Choose it
-/// to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
-/// it.
+/// Of the four grids of the paper it has the fewest ray-triangle tests, and the longest build in the most memory by
+/// far. Choose it to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to it.
 ///
 /// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle. The
 /// exact size takes a dry run. `hgrid_sizes` without scratch answers with a bound that no mesh comes near, up to 8
 /// GiB: ask with scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
-/// A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
-/// to eight children with tight boxes.
+/// A bounding volume hierarchy over a grid of the triangles' centres: each triangle lies in one leaf, and a node has
+/// up to eight children with tight boxes.
 ///
 /// It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
 /// belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.

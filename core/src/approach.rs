@@ -65,8 +65,7 @@ pub(crate) struct Approach {
     pub(crate) slack: f32,
     /// Reach of the box from the anchor.
     pub(crate) reach: Reach,
-    /// True if the ray starts so far away that a traversal would not be exact enough: all triangles have to
-    /// be tested.
+    /// True if the ray starts so far away that a traversal would not be exact enough: all triangles have to be tested.
     pub(crate) is_remote: bool,
 }
 

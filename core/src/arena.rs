@@ -1,8 +1,7 @@
 //! The caller's memory: checked views of a region, and a type that gives aligned ones.
 //!
-//! There is no allocator here. A region is a slice of bytes that starts at a multiple of 64; a
-//! layout says at which byte each section starts, and the cast from bytes to words is checked
-//! (alignment and length), never assumed.
+//! There is no allocator here. A region is a slice of bytes that starts at a multiple of 64; a layout says at which
+//! byte each section starts, and the cast from bytes to words is checked (alignment and length), never assumed.
 
 use core::fmt;
 use core::ops::Range;

@@ -5,11 +5,10 @@
 //! | header | section | section | ...                              |
 //! ```
 //!
-//! Every section starts at a multiple of 64 and is filled up with zeros. The header holds counts,
-//! never offsets: where a section lies follows from the counts through the method's layout, the
-//! same one that answered how many bytes the build needs. There is no pointer in it, so it can be
-//! copied, mapped from a file, sent, or put in flash. It is in the byte order of its machine; the
-//! other order is recognised and refused.
+//! Every section starts at a multiple of 64 and is filled up with zeros. The header holds counts, never offsets: where
+//! a section lies follows from the counts through the method's layout, the same one that answered how many bytes the
+//! build needs. There is no pointer in it, so it can be copied, mapped from a file, sent, or put in flash. It is in the
+//! byte order of its machine; the other order is recognised and refused.
 
 use glam::Vec3A;
 use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, transmute};

@@ -76,8 +76,7 @@ pub(crate) const fn row(height: u32, y: u32, z: u32) -> usize {
     z as usize * height as usize + y as usize
 }
 
-/// A box cut into equal cells. Plain arrays, so that views of
-/// grids need no special alignment.
+/// A box cut into equal cells. Plain arrays, so that views of grids need no special alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lattice {
     /// The box's least corner, pad included.

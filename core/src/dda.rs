@@ -1,14 +1,18 @@
 //! Walking a ray through cells without drift (Amanatides and Woo 1987; robust as in LD08).
 //!
-//! Distances are measured in cells along the ray's longest axis, from where the ray enters the box;
-//! so they need no scene scale. The distance to the next border is computed from the integer cell
-//! at every step, `base + cell * delta`, and never summed up: its error stays a few roundings
-//! however long the walk, and what error remains lies inside the margin by which triangles were
-//! spread over cells. A walk within a larger cell ends where the walk around it leaves that cell: a
-//! border has one distance.
+//! ```text
+//! loop: read the list of the cell; axis = the one whose border ahead is nearest
+//!       done if the ray ends before that border, or the cell is the last on the axis
+//!       cell += step on the axis; border ahead = base + cell * delta, of the last cell the end of the walk
+//! ```
 //!
-//! A [`Line`] is the ray in a lattice; a [`Walk`] goes along it through equal cells, those of the
-//! lattice or larger ones of a macrocell level.
+//! Distances are measured in cells along the ray's longest axis, from where the ray enters the box; so they need no
+//! scene scale. They are computed from the integer cell at every step and never summed up: the error stays a few
+//! roundings however long the walk, and lies inside the margin by which triangles were spread over cells. A walk
+//! within a larger cell ends where the walk around it leaves that cell: a border has one distance.
+//!
+//! A [`Line`] is the ray in a lattice; a [`CellWalk`] goes along it through equal cells, those of the lattice or larger
+//! ones of a macrocell level.
 
 use glam::{BVec3A, Vec3A, Vec3Swizzles as _};
 
@@ -43,7 +47,7 @@ pub(crate) struct Line {
 
 /// A walk along a line through cells of one size.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Walk {
+pub(crate) struct CellWalk {
     /// The cell the walk is in: whole numbers.
     cell: Vec3A,
     /// Distance at which it was entered.
@@ -167,7 +171,7 @@ impl Line {
     /// A walk through a box of so many cells, from `entered` or where the line enters the box;
     /// `None` if it passes the box or has left it by then. A line that runs along the border is in.
     #[inline]
-    pub(crate) fn walk_in(&self, entered: f32, resolution: [u32; 3]) -> Option<Walk> {
+    pub(crate) fn walk_in(&self, entered: f32, resolution: [u32; 3]) -> Option<CellWalk> {
         let cells = Vec3A::from_array(resolution.map(as_f32));
         let [near, far] = self.inside(&Aabb { min: Vec3A::ZERO, max: cells });
         let near = entered.max(near);
@@ -194,8 +198,9 @@ impl Line {
     /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice
     /// wide, which ends where the ray passes `exits`.
     ///
-    /// `exits` are those of the larger cell around these ([`Walk::next`]). They are not computed from the last cells
-    /// here: where the ray runs nearly along a border, the two differ by many cells, and the walk would leave a gap.
+    /// `exits` are those of the larger cell around these ([`CellWalk::next`]). They are not computed from the last
+    /// cells here: where the ray runs nearly along a border, the two differ by many cells, and the walk would leave a
+    /// gap.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -204,7 +209,7 @@ impl Line {
         min: [u32; 3],
         max: [u32; 3],
         exits: Vec3A,
-    ) -> Walk {
+    ) -> CellWalk {
         // All axes at once: a ray begins many walks, and most are short.
         let position = (self.position + self.rate * from) / size;
         let (low, high) = (Vec3A::from_array(min.map(as_f32)), Vec3A::from_array(max.map(as_f32)));
@@ -213,11 +218,11 @@ impl Line {
         let base = self.base + self.delta.max(Vec3A::ZERO) * size;
         let last = Vec3A::select(delta.cmpgt(Vec3A::ZERO), high, low);
         let next = Vec3A::select(cell.cmpeq(last), exits, base + cell * delta);
-        Walk { cell, entered: from, next, exits, delta, base, step: self.step, last }
+        CellWalk { cell, entered: from, next, exits, delta, base, step: self.step, last }
     }
 }
 
-impl Walk {
+impl CellWalk {
     /// The cell the walk is in.
     #[inline(always)]
     pub(crate) fn cell(&self) -> [u32; 3] {
@@ -285,7 +290,7 @@ impl Walk {
 }
 
 /// The axis with the nearest border, and its distance; of borders in one point the last
-/// axis', as in [`Walk::advance_far`].
+/// axis', as in [`CellWalk::advance_far`].
 ///
 /// It takes a copy of the distances: a walk that is passed by reference lives in memory.
 #[cold]
@@ -310,7 +315,7 @@ mod tests {
 
     /// A walk with these distances: to the first borders, between borders, and to the last ones. Up
     /// from the first cell or, on some axes, down from the end.
-    fn walk(first: [f32; 3], delta: [f32; 3], exits: [f32; 3], is_down: BVec3A) -> Walk {
+    fn walk(first: [f32; 3], delta: [f32; 3], exits: [f32; 3], is_down: BVec3A) -> CellWalk {
         let [first, delta, exits] = [first, delta, exits].map(Vec3A::from_array);
         // As a line has it on axes that it runs parallel to.
         let is_parallel = delta.cmpeq(Vec3A::ZERO);
@@ -319,7 +324,7 @@ mod tests {
         let delta = delta * step;
         let base = Vec3A::select(is_parallel, Vec3A::INFINITY, first - cell * delta);
         let step = Vec3A::select(is_parallel, Vec3A::ZERO, step);
-        Walk {
+        CellWalk {
             cell,
             entered: 0.0,
             next: Vec3A::select(is_parallel, Vec3A::INFINITY, first),
@@ -332,7 +337,10 @@ mod tests {
     }
 
     /// The cells of a walk and the distances at which they are entered, then how it ends.
-    fn steps(mut walk: Walk, step: impl Fn(&mut Walk) -> Step) -> Vec<([u32; 3], u32, Step)> {
+    fn steps(
+        mut walk: CellWalk,
+        step: impl Fn(&mut CellWalk) -> Step,
+    ) -> Vec<([u32; 3], u32, Step)> {
         let mut all = Vec::new();
         loop {
             let last = step(&mut walk);

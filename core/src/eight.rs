@@ -5,9 +5,8 @@
 //!                                                                    y, z likewise
 //! ```
 //!
-//! The lanes do the same operations in the same order as one triangle alone, none of them fused,
-//! so they drop the same triangles. Triangles that pass, about one a ray, are decided in f64 one
-//! by one.
+//! The lanes do the same operations in the same order as one triangle alone, none of them fused, so they drop the same
+//! triangles. Triangles that pass, about one a ray, are decided in f64 one by one.
 //!
 //! Rows are transposed in registers: a row that is copied through memory, or `map` over arrays of vectors, stores
 //! pieces, and the load of the whole waits for these stores.

@@ -1,7 +1,6 @@
 //! The errors: one enum for all calls, with the numbers that help, without strings or allocation.
 //!
-//! A query of one ray has no error: a miss is not one, and a grid that
-//! was opened answers every ray.
+//! A query of one ray has no error: a miss is not one, and a grid that was opened answers every ray.
 
 use core::fmt;
 
@@ -20,7 +19,7 @@ pub enum Region {
 /// The part of a mesh description that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshField {
-    /// The vertices: their bytes end before the last vertex, or the stride is below 12 bytes.
+    /// The vertices or boxes: their bytes end before the last one, or the stride is below 12 bytes, of boxes 24.
     Positions,
     /// The indices: their bytes end before the last triangle, or the stride is below three indices.
     Indices,
@@ -46,9 +45,8 @@ pub enum BatchField {
 pub enum ConfigField {
     /// Not a method of this version.
     Method,
-    /// Zero, negative, NaN, or so large that an axis would need more than
-    /// [`MAX_RESOLUTION`](limits::MAX_RESOLUTION) cells (1023 in a recursive grid), or ids and subgrids
-    /// more than 8 GiB.
+    /// Zero, negative, NaN, or so large that an axis would need more than [`MAX_RESOLUTION`](limits::MAX_RESOLUTION)
+    /// cells (1023 in a recursive grid), or ids and subgrids more than 8 GiB.
     Density,
     /// Below 2, for a method with macrocells.
     MacrocellFactor,
@@ -78,7 +76,7 @@ pub enum Error {
     },
     /// The mesh description contradicts itself.
     InvalidMesh(MeshField),
-    /// More triangles than 32-bit ids can name ([`MAX_TRIANGLES`](limits::MAX_TRIANGLES)).
+    /// More triangles, boxes or instances than the method takes: 2^31 in a tree, else [`limits::MAX_TRIANGLES`].
     TooManyTriangles,
     /// A triangle names a vertex that the mesh does not have.
     IndexOutOfRange {
@@ -101,8 +99,7 @@ pub enum Error {
     /// The loop of a parallel build ran a task twice or not at all: see
     /// [`Control::run`](crate::Control::run). There is no grid.
     InvalidParallelFor,
-    /// The caller's [`Control::progress`](crate::Control::progress)
-    /// asked to stop. There is no grid.
+    /// The caller's [`Control::progress`](crate::Control::progress) asked to stop. There is no grid.
     Cancelled,
     /// An array of a batch of rays has the wrong length or stride.
     InvalidBatch(BatchField),
@@ -178,7 +175,7 @@ impl fmt::Display for Error {
                 write!(f, "the {region} region must start at a multiple of {}", limits::ALIGNMENT)
             }
             Self::InvalidMesh(MeshField::Positions) => {
-                f.write_str("the position bytes end before the last vertex, or the stride is below 12")
+                f.write_str("the position bytes end before the last vertex, or the stride is below 12, of boxes 24")
             }
             Self::InvalidMesh(MeshField::Indices) => f.write_str(
                 "the index bytes end before the last triangle, or the stride is below three indices",
@@ -191,9 +188,11 @@ impl fmt::Display for Error {
                 "a part of the mesh is joined itself, the parts are not numbered, or they or their vertices \
                  are too many",
             ),
-            Self::TooManyTriangles => {
-                write!(f, "a grid takes at most {} triangles", limits::MAX_TRIANGLES)
-            }
+            Self::TooManyTriangles => write!(
+                f,
+                "a tree takes at most 2^31 triangles, boxes or instances, other methods take {}",
+                limits::MAX_TRIANGLES
+            ),
             Self::IndexOutOfRange { triangle } => {
                 write!(f, "triangle {triangle} names a vertex that the mesh does not have")
             }
@@ -201,7 +200,7 @@ impl fmt::Display for Error {
                 write!(f, "triangle {triangle} has a coordinate that is NaN, infinite or too large")
             }
             Self::InvalidBatch(BatchField::Rays) => {
-                f.write_str("the ray bytes end before the last ray, or the stride is below 32")
+                f.write_str("the ray bytes end before the last ray, or the stride is below 32, in scenes 48")
             }
             Self::InvalidBatch(BatchField::Answers) => f.write_str(
                 "there are not as many answers as rays, their bytes end before the last, or the stride is \

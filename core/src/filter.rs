@@ -34,13 +34,12 @@
 //! The own roundings of W act on values that are at most |det| <= 2 D E^2 if the line meets the
 //! triangle, which is the only case that matters.
 //!
-//! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the
-//! sheared plane: by the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 R, and by the
-//! distance between its ray and the line through the anchor ([`Approach::slack`]). If it reports a
-//! hit, the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Moving
-//! them changes an edge function by at most 16 E s + 14 s^2 on the sheared plane. U, V and W are these
-//! times |d.z|, which is below 2: z is the axis along which d is longest. The rest is the second order
-//! of u, below 2^-19 of everything, and underflow:
+//! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the sheared plane: by
+//! the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 R, and by the distance between its ray and the
+//! line through the anchor ([`Approach::slack`]). If it reports a hit, the corners lie within 4 E + 3 s of the ray on
+//! that plane, as the ray is among them. Moving them changes an edge function by at most 16 E s + 14 s^2 on the sheared
+//! plane. U, V and W are these times |d.z|, which is below 2: z is the axis along which d is longest. The rest is the
+//! second order of u, below 2^-19 of everything, and underflow:
 //!
 //! ```text
 //! slope     u D (29 R + 19 X) + 32 slack       29 and 19 for 28 and 18: higher orders, 32 * 7 * 2^-53 R
@@ -252,8 +251,7 @@ impl RayFilter {
 }
 
 impl<S: Simd> LineFilter<f32x8<S>> {
-    /// The filters of eight rays. Directions are scaled; no corner is farther than `distance` from its
-    /// ray's origin.
+    /// The filters of eight rays. Directions are scaled; no corner is farther than `distance` from its ray's origin.
     #[inline(always)]
     pub(crate) fn scaled(
         simd: S,
@@ -371,8 +369,7 @@ mod tests {
         core::array::from_fn(|axis| a[axis] + b[axis] * share)
     }
 
-    /// Triangles of all shapes in the box from -1 to 1: any, small, slivers, needles, flat on an
-    /// axis, without area.
+    /// Triangles of all shapes in the box from -1 to 1: any, small, slivers, needles, flat on an axis, without area.
     fn triangle(random: &mut Random) -> Triangle {
         let [a, b, c] = [random.point(), random.point(), random.point()];
         let share = [1.0, 1e-2, 1e-4, 1e-6, 1e-9, 1e-20][random.below(6)];

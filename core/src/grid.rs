@@ -42,20 +42,18 @@ pub struct Grid<'a> {
 impl<'a> Grid<'a> {
     /// Builds a grid in memory that the caller brings.
     ///
-    /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a
-    /// multiple of [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes)
-    /// tells how large they must be; more is not used. The same mesh and configuration give the
-    /// same bits, on every machine of the same byte order. The stack of a build is below 18 KiB,
-    /// with more than one task ([`Control`]) below 96 KiB, that of a task below 13 KiB, beside what
-    /// the caller's own functions take.
+    /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a multiple of
+    /// [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes) tells how large they must be;
+    /// more is not used. The same mesh and configuration give the same bits, on every machine of the same byte order.
+    /// The stack of a build is below 18 KiB, with more than one task ([`Control`]) below 96 KiB, that of a task below
+    /// 13 KiB, beside what the caller's own functions take.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
-    /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
-    /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
-    /// [`Error::MethodLeftOut`] the method. After an error the index region is unchanged, except with trees,
-    /// variable and recursive grids, which write to it while they build: then it holds nothing of use. Both
-    /// regions can be used again.
+    /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT), [`Error::NonFiniteTriangle`] the
+    /// triangle; [`Error::InvalidConfig`] the field, [`Error::MethodLeftOut`] the method. After an error the index
+    /// region is unchanged, except with trees, variable and recursive grids, which write to it while they build: then
+    /// it holds nothing of use. Both regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -84,15 +82,13 @@ impl<'a> Grid<'a> {
 
     /// Builds a grid on the caller's threads. It is the same grid as that of [`build`](Self::build), bit for bit.
     ///
-    /// Only [`Method::Bvh`] is cut into tasks; the other methods build on the thread
-    /// that calls. [`sizes_with`](crate::sizes_with) and
-    /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks
-    /// take; where there is less, but enough for fewer, there are fewer.
+    /// Only [`Method::Bvh`] is cut into tasks; the other methods build on the thread that calls.
+    /// [`sizes_with`](crate::sizes_with) and [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much
+    /// memory so many tasks take; where there is less, but enough for fewer, there are fewer.
     ///
     /// # Errors
-    /// The errors of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
-    /// not at all, and [`Error::Cancelled`] if the progress callback returned false; after these two
-    /// the index holds nothing of use.
+    /// The errors of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or not at all, and
+    /// [`Error::Cancelled`] if the progress callback returned false; after these two the index holds nothing of use.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Control, Error, Grid, TriangleMesh, sizes};
@@ -129,8 +125,7 @@ impl<'a> Grid<'a> {
         Ok(grid)
     }
 
-    /// Opens a grid that was built earlier or elsewhere, in O(1);
-    /// bytes behind the grid are ignored.
+    /// Opens a grid that was built earlier or elsewhere, in O(1); bytes behind the grid are ignored.
     ///
     /// The mesh must be the one it was built for. O(1) cannot find all damage: on damaged bytes queries may answer
     /// wrongly, but they stay inside the blob and end. Use [`validate`](Self::validate) to be sure.
@@ -164,15 +159,13 @@ impl<'a> Grid<'a> {
 
     /// Proves that the blob is a grid of the mesh, and so that every answer is right.
     ///
-    /// O(triangles + references) time. `scratch` is a bit for each triangle of a grid of
-    /// [`Method::Bvh`] ([`validate_bytes`](Self::validate_bytes)), nothing for the other methods; it need
-    /// not be aligned. A grid that was just built needs no proof; one that came from a file, a network
-    /// or another process may.
+    /// O(triangles + references) time. `scratch` is a bit for each triangle of a grid of [`Method::Bvh`]
+    /// ([`validate_bytes`](Self::validate_bytes)), nothing for the other methods; it need not be aligned. A grid that
+    /// was just built needs no proof; one that came from a file, a network or another process may.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] if there is less scratch;
-    /// [`Error::Corrupt`] with the position of a byte that no build writes;
-    /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
+    /// [`Error::OutOfMemory`] if there is less scratch; [`Error::Corrupt`] with the position of a byte that no build
+    /// writes; [`Error::IndexOutOfRange`] if the mesh itself is damaged.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -346,8 +339,7 @@ impl<'a> Grid<'a> {
         by_kind!(&self.structure, tree => Some(tree), None)
     }
 
-    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
-    /// meets.
+    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it meets.
     pub(crate) fn search_boxes(
         &self,
         ray: &RayF64,
@@ -374,9 +366,8 @@ impl<'a> Grid<'a> {
         );
     }
 
-    /// Passes `test` the triangles of a tree that may be within a distance of a point, about from near to
-    /// far; returns false for the four grids. `test` returns the distance within which triangles matter from
-    /// then on.
+    /// Passes `test` the triangles of a tree that may be within a distance of a point, about from near to far; returns
+    /// false for the four grids. `test` returns the distance within which triangles matter from then on.
     pub(crate) fn approach<T: Tally>(
         &self,
         point: [f32; 3],
@@ -416,9 +407,8 @@ impl<'a> Grid<'a> {
         &self.mesh
     }
 
-    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it
-    /// again. Of a packed grid it is the grid alone, to be opened with its mesh;
-    /// [`pack`](Self::pack) makes a packed one again.
+    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it again. Of a packed grid it is
+    /// the grid alone, to be opened with its mesh; [`pack`](Self::pack) makes a packed one again.
     #[must_use]
     pub const fn blob(&self) -> &'a [u8] {
         self.blob
@@ -470,8 +460,7 @@ impl<'a> Grid<'a> {
         self.header().map_or(0, |header| header.skipped_count)
     }
 
-    /// Primitive ids in all cells or leaves together; words of the pool for a
-    /// variable or recursive grid.
+    /// Primitive ids in all cells or leaves together; words of the pool for a variable or recursive grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {
         self.header().map_or(0, |header| header.reference_count)

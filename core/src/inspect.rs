@@ -11,8 +11,7 @@ use crate::visit::EVERYWHERE;
 pub struct Statistics {
     /// Triangles left out because a coordinate is not finite.
     pub skipped_count: u32,
-    /// Triangles of which two corners are the same point. They are in
-    /// the grid, and no ray hits them.
+    /// Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
     pub degenerate_count: u32,
     /// The first skipped or degenerate triangle, or [`INVALID_ID`].
     pub first_bad: u32,

@@ -44,10 +44,9 @@
 //! core/DESIGN.md tells how it all works, core/REJECTED.md what was left out, and CONTRIBUTING.md how to add a query or
 //! a method.
 //!
-//! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
-//! `bvh`, all on by default), so that a program with little flash takes the ones it needs:
-//! [`Method::is_available`] tells which methods there are, and a call with another method returns
-//! [`Error::MethodLeftOut`].
+//! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and `bvh`, all on by
+//! default), so that a program with little flash takes the ones it needs: [`Method::is_available`] tells which methods
+//! there are, and a call with another method returns [`Error::MethodLeftOut`].
 //!
 //! The feature `alloc`, off by default, adds `OwnedGrid`, which owns its memory and its mesh and has no lifetime
 //! parameter. It changes nothing else.

@@ -1,7 +1,6 @@
 //! The limits of meshes, grids and scenes, and the alignment of memory.
 
-/// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree
-/// takes half as many.
+/// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree takes half as many.
 pub const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
 
 /// Coordinates beyond this magnitude count as non-finite: the largest power of two for which the

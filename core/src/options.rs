@@ -75,9 +75,8 @@ pub struct QueryOptions<'q> {
     /// Counters that add up the work. With them, the rays of a batch are traced one by one, because the rays of a
     /// group share work that belongs to no single ray.
     pub counters: Option<&'q mut Counters>,
-    /// Memory in which rays of [`Coherence::Incoherent`](crate::Coherence::Incoherent) may be
-    /// sorted, 16 bytes a ray: see there. It holds anything before and after. Queries of one ray or
-    /// point do not use it.
+    /// Memory in which rays of [`Coherence::Incoherent`](crate::Coherence::Incoherent) may be sorted, 16 bytes a ray:
+    /// see there. It holds anything before and after. Queries of one ray or point do not use it.
     pub scratch: &'q mut [u8],
 }
 

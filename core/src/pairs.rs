@@ -1,9 +1,15 @@
-//! Eight pairs of a ray and a triangle, decided in f64 at once: the test of
-//! [`triangle`](crate::triangle) in eight lanes, with the same bits.
+//! Eight pairs of a ray and a triangle, decided in f64 at once: the test of [`triangle`](crate::triangle) in eight
+//! lanes, with the same bits.
 //!
-//! The lanes do the same operations in the same order, none of them fused. Where that test goes on without
-//! rounding (an edge function that is small beside its products, a hit next to an end of the range), a lane
-//! gives up, and the pair is decided alone: one in some hundreds.
+//! ```text
+//! place   each corner, so that the ray is the z axis
+//! edges   two edge functions of opposite signs: a miss; one that is small beside its products: unsure
+//! depth   the corners' depths, weighted by the edge functions
+//! range   all corners inside the ray's range: a hit; the hit clearly outside: a miss; else unsure
+//! ```
+//!
+//! The lanes do the same operations in the same order, none of them fused. Where that test goes on without rounding, a
+//! lane is unsure, and the pair is decided alone: one in some hundreds.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8};

@@ -102,8 +102,7 @@ impl Grid<'_> {
     /// A triangle that blocks a ray, of those that the options let count; `None` if the ray is not
     /// [`occluded`](Grid::occluded_with).
     ///
-    /// It is hit within the ray's range, but need not be the closest. A batch or another machine may name another
-    /// one.
+    /// It is hit within the ray's range, but need not be the closest. A batch or another machine may name another one.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -139,12 +138,11 @@ impl Grid<'_> {
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
-    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
-    /// are. Without a filter, a tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps
-    /// the nearest in a heap, in time proportional to the number of hits times the logarithm of the room.
-    /// With a filter, and with the other methods if `hits` is too short for all hits, the ray is traversed
-    /// again for every sixteen hits, each time from the last of them. That takes no memory, but the time for
-    /// thousands of hits in one cell grows with the square of their number.
+    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there are. Without a filter, a
+    /// tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps the nearest in a heap, in time proportional
+    /// to the number of hits times the logarithm of the room. With a filter, and with the other methods if `hits` is
+    /// too short for all hits, the ray is traversed again for every sixteen hits, each time from the last of them. That
+    /// takes no memory, but the time for thousands of hits in one cell grows with the square of their number.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -33,11 +33,10 @@ pub struct Refit {
 /// finite: it is in no leaf.
 ///
 /// # Errors
-/// [`Error::CannotRefit`] for a grid of another method and for a packed one
-/// ([`pack`](Grid::pack) it after the refit); [`Error::MeshMismatch`] for other counts, and if a triangle
-/// became finite; [`Error::NonFiniteTriangle`] if one of a leaf is not finite any more, whatever the flags
-/// of the build; [`Error::IndexOutOfRange`]; [`Error::Corrupt`] if nodes or ids of the tree are damaged;
-/// and those of [`Grid::open`]. After an error the blob is as it was.
+/// [`Error::CannotRefit`] for a grid of another method and for a packed one ([`pack`](Grid::pack) it after the refit);
+/// [`Error::MeshMismatch`] for other counts, and if a triangle became finite; [`Error::NonFiniteTriangle`] if one of a
+/// leaf is not finite any more, whatever the flags of the build; [`Error::IndexOutOfRange`]; [`Error::Corrupt`] if
+/// nodes or ids of the tree are damaged; and those of [`Grid::open`]. After an error the blob is as it was.
 ///
 /// ```
 /// # use hgrid_core::*;

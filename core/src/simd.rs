@@ -1,10 +1,9 @@
 //! Chooses the vector instructions of queries: detects them once, and never uses more than the machine has.
 //!
-//! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once
-//! for each level that the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the
-//! one that was asked for, or the nearest below. Every level gives the same bits: the kernels use nothing that
-//! rounds differently, and fused multiply-adds only where the product is exact or no hit depends on the last bits
-//! (the slab tests of groups).
+//! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once for each level that
+//! the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the one that was asked for, or the
+//! nearest below. Every level gives the same bits: the kernels use nothing that rounds differently, and fused
+//! multiply-adds only where the product is exact or no hit depends on the last bits (the slab tests of groups).
 //!
 //! ```text
 //! target          at build time                     at run time
@@ -21,8 +20,7 @@ use fearless_simd::Simd;
 
 /// The vector instructions that queries use. All give the same hits, bit for bit.
 ///
-/// A level that the machine lacks cannot be forced on it: queries then use the nearest level below that it
-/// has.
+/// A level that the machine lacks cannot be forced on it: queries then use the nearest level below that it has.
 ///
 /// ```
 /// use hgrid_core::SimdLevel;
@@ -54,8 +52,7 @@ impl SimdLevel {
 
     /// The best level of this machine.
     ///
-    /// Asks the processor the first time, and whether the operating
-    /// system keeps the wide registers.
+    /// Asks the processor the first time, and whether the operating system keeps the wide registers.
     #[inline]
     #[must_use]
     pub fn detect() -> Self {

@@ -30,9 +30,8 @@ impl Sizes {
         Self::bound_parallel(triangles, config, 1)
     }
 
-    /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Control::tasks`]). A task of a tree takes no more than a byte of scratch for four triangles; the
-    /// other methods have one task.
+    /// Enough for any mesh with so many triangles and a build with so many tasks ([`Control::tasks`]). A task of a tree
+    /// takes no more than a byte of scratch for four triangles; the other methods have one task.
     ///
     /// ```
     /// use hgrid_core::{Config, Method, Sizes};
@@ -121,8 +120,7 @@ pub fn sizes_with(
 /// be small enough to plan in the scratch.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or
-/// the scratch; those of [`sizes`].
+/// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or the scratch; those of [`sizes`].
 ///
 /// ```
 /// use hgrid_core::{Block, Config, TriangleMesh, fit, sizes};

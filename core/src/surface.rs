@@ -1,18 +1,17 @@
-//! The point where a ray met the mesh, and the starts of the next rays.
+//! The point where a ray met the mesh, and the origins of the next rays.
 //!
-//! A hit's point is off its triangle by rounding, so a ray that starts there may hit the triangle that it
-//! leaves. A ray that starts above the plane and leaves it does not: the triangle test decides exactly on
-//! which side of `t_min` the plane is met. How far above depends on the triangle alone, not on the scene's
-//! scale:
+//! A hit's point is off its triangle by rounding, so a ray that starts there may hit the triangle that it leaves. A ray
+//! that starts above the plane and leaves it does not: the triangle test decides exactly on which side of `t_min` the
+//! plane is met. How far above depends on the triangle alone, not on the scene's scale:
 //!
 //! ```text
-//! corners relative to the start, L the largest coordinate of these:
+//! corners relative to the origin, L the largest coordinate of these:
 //!   the point, in f64, is off the plane by                    6 * 2^-53 L
 //!   a triangle seen edge on may be hit from as far off as     2^-50 L      (triangle.rs)
-//!   what a start is lifted by                                 2^-20 L
+//!   what an origin is lifted by                               2^-20 L
 //! ```
 //!
-//! The lift is larger than necessary, for renderers that round the start again. The start is rounded away from the
+//! The lift is larger than necessary, for renderers that round the origin again. The origin is rounded away from the
 //! plane on each axis, so rounding takes nothing from the lift.
 
 use glam::DVec3;
@@ -28,15 +27,15 @@ pub struct Surface {
     pub position: [f32; 3],
     /// The triangle's normal, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
-    /// Start for rays that leave on that side: reflections, and rays to lights.
+    /// Origin for rays that leave on that side: reflections, and rays to lights.
     pub above: [f32; 3],
-    /// Start for rays that go on through the triangle.
+    /// Origin for rays that go on through the triangle.
     pub below: [f32; 3],
     /// 1 if the ray met the front, from which the vertices appear counter-clockwise, else 0.
     pub is_front: u32,
 }
 
-/// The amount by which a start is lifted, in parts of the distance from the point to the farthest corner, measured
+/// The amount by which an origin is lifted, in parts of the distance from the point to the farthest corner, measured
 /// along one axis.
 const LIFT: f64 = 1.0 / (1 << 20) as f64;
 
@@ -44,7 +43,7 @@ const LIFT: f64 = 1.0 / (1 << 20) as f64;
 const LEAST: f64 = 1e-44;
 
 impl TriangleMesh<'_> {
-    /// The point where a ray met this mesh, with starts for the rays that leave it; `None` if the hit
+    /// The point where a ray met this mesh, with origins for the rays that leave it; `None` if the hit
     /// names no triangle, as [`Hit::MISS`], or the ray has no direction.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
@@ -89,7 +88,7 @@ pub(crate) struct Facet {
     pub(crate) point: DVec3,
     /// Of length 1, on the side that the ray came from.
     pub(crate) normal: DVec3,
-    /// The distance of starts from the plane.
+    /// The distance of origins from the plane.
     pub(crate) lift: f64,
     pub(crate) is_front: bool,
 }

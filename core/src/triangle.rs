@@ -33,10 +33,9 @@
 //! t          U, V and W as weights of the corners' t, and 1 to f32  2^-24 |t| + 2^-38 (|t| + Z)
 //! ```
 //!
-//! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they should be, rounded
-//! to f32. Corner and origin are f32: where their exponents differ by no more than 28, `p - o` is exact. From more
-//! than 2^50 times as far away as the triangle is large, all corners may be projected to one point:
-//! a miss.
+//! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they should be, rounded to
+//! f32. Corner and origin are f32: where their exponents differ by no more than 28, `p - o` is exact. From more than
+//! 2^50 times as far away as the triangle is large, all corners may be projected to one point: a miss.
 //!
 //! # The range
 //!
@@ -404,8 +403,7 @@ fn is_outside([u, v, w]: [f64; 3]) -> bool {
     any_negative & any_positive
 }
 
-/// The edge functions of three places, each with its exact sign and an error of a few roundings of
-/// itself.
+/// The edge functions of three places, each with its exact sign and an error of a few roundings of itself.
 #[cold]
 #[inline(never)]
 fn exact_edges([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {

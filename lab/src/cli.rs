@@ -40,7 +40,12 @@ pub const DEFAULT_SCENE: &str = "procedural:knot:500K";
 
 /// Ray tracing with trees and hashed grids: renders, packs, measures.
 #[derive(Debug, Parser)]
-#[command(name = "hgrid", version, after_help = EXAMPLES, override_usage = "hgrid [FILE] [OPTIONS]\n       hgrid COMMAND ...")]
+#[command(
+    name = "hgrid",
+    version,
+    after_help = EXAMPLES,
+    override_usage = "hgrid [FILE] [OPTIONS]\n       hgrid COMMAND ..."
+)]
 pub struct Cli {
     /// The command to run.
     #[command(subcommand)]

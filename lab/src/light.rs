@@ -30,7 +30,7 @@ pub(crate) struct Spot {
     pub(crate) at: usize,
     /// The unit normal on the viewer's side.
     pub(crate) normal: [f32; 3],
-    /// The start of rays that leave the surface on that side.
+    /// The origin of rays that leave the surface on that side.
     pub(crate) start: [f32; 3],
     /// Two numbers from 0 to 1 that differ from pixel to pixel.
     pub(crate) noise: [f64; 2],

@@ -55,7 +55,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     };
     writeln!(
         io::stdout(),
-        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles}{note}"
+        "wrote {output}: {bytes} bytes, a grid by {method} and its mesh of {triangles}{note}"
     )?;
     Ok(())
 }

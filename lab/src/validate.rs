@@ -58,7 +58,10 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let (method, triangles) = (grid.method().name(), triangles(info.triangle_count));
     let time = seconds(start.elapsed().as_secs_f64());
     let rest = rest(&blob, &info);
-    writeln!(io::stdout(), "{file}: valid, a {method} of {triangles}, proved in {time}{rest}")?;
+    writeln!(
+        io::stdout(),
+        "{file}: valid, a grid by {method} of {triangles}, proved in {time}{rest}"
+    )?;
     Ok(())
 }
 

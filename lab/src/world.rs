@@ -3,7 +3,7 @@
 //! ```text
 //! World      closest hits       any hit               surface
 //! mesh       a tile together    all rays together     the mesh's
-//! instances  a tile together    all rays together     the scene's, with starts as far off as rays in f32 need
+//! instances  a tile together    all rays together     the scene's, with origins as far off as rays in f32 need
 //! ```
 
 use hgrid_core::{
@@ -118,7 +118,7 @@ impl World<'_> {
         }
     }
 
-    /// Returns the point where a ray met a triangle, with starts for rays that leave it.
+    /// Returns the point where a ray met a triangle, with origins for rays that leave it.
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
         match self {
@@ -138,7 +138,7 @@ pub(crate) const fn on_mesh(SceneHit { t, u, v, primitive, .. }: SceneHit) -> Hi
     Hit { t, u, v, primitive }
 }
 
-/// Returns the surface of a scene for rays in f32. Core's starts are f64; rounded, they need a further lift.
+/// Returns the surface of a scene for rays in f32. Core's origins are f64; rounded, they need a further lift.
 #[expect(clippy::cast_possible_truncation, reason = "to the precision of the rays")]
 fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     let Object::Grid(grid) = scene.object_of(hit)? else { return None };

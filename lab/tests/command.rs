@@ -301,7 +301,7 @@ fn one_triangle_is_no_plural() {
         ("render nan.obj --size 16", "; one triangle that is not finite is left out"),
         ("info flat.obj", "without area  1 triangle\n"),
         ("pack one.obj -o one.hgrid", "its mesh of 1 triangle\n"),
-        ("validate one.hgrid", "valid, a bvh of 1 triangle, proved"),
+        ("validate one.hgrid", "valid, a grid by bvh of 1 triangle, proved"),
         ("animate one.obj --size 16 --frames 1", "one.obj: 1 triangle, bvh"),
         ("animate a.obj --size 16 --frames 1 --instances 1", "a.obj: 3 triangles, 1 instance, bvh"),
     ] {

@@ -10,8 +10,8 @@
 #define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
 #define BOUNDS(count) \
     printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
-           HGRID_VALIDATE_BOUND(count), HGRID_SCENE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
-           HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
+           HGRID_VALIDATE_BOUND(count), HGRID_SCENE_BOUND(count), HGRID_INDEX_BOUND(count), \
+           HGRID_SCRATCH_BOUND(count), HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
            HGRID_INDEX_BOUND(count), HGRID_BVH_HIGH_SCRATCH_BOUND(count))
 
 static void layout(void)

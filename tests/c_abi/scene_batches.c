@@ -181,8 +181,9 @@ static void rays_and_answers_in_one_struct(hgrid_coherence coherence)
            hgrid_intersect_scene_n(&all_kinds, &paths->ray, sizeof *paths,
                                    (hgrid_scene_hit *)(void *)&paths->ray.direction[1], sizeof *paths, SOME, coherence,
                                    NULL));
-    EXPECT(HGRID_ERROR_OVERLAP, hgrid_occluded_scene_n(&all_kinds, &paths->ray, sizeof *paths, (uint8_t *)&paths->ray + 47,
-                                                       sizeof *paths, SOME, coherence, NULL));
+    EXPECT(HGRID_ERROR_OVERLAP,
+           hgrid_occluded_scene_n(&all_kinds, &paths->ray, sizeof *paths, (uint8_t *)&paths->ray + 47, sizeof *paths,
+                                  SOME, coherence, NULL));
     CHECK(memcmp(as_expected, paths, SOME * sizeof *paths) == 0);
 }
 
@@ -289,8 +290,8 @@ static void no_rays_are_no_error(void)
     CHECK(work.primitive_tests == 1 && work.cell_steps == 2 && work.grid_steps == 3);
     /* A scene without instances misses. */
     hgrid_scene empty;
-    EXPECT(HGRID_OK, hgrid_build_scene(NULL, 0, NULL, 0, NULL, index_region, INDEX_BYTES, scratch, SCRATCH_BYTES, &empty,
-                                       NULL));
+    EXPECT(HGRID_OK, hgrid_build_scene(NULL, 0, NULL, 0, NULL, index_region, INDEX_BYTES, scratch, SCRATCH_BYTES,
+                                       &empty, NULL));
     EXPECT(HGRID_OK, hgrid_intersect_scene_n(&empty, rays, 0, hits, 0, RAYS, coherence, NULL));
     EXPECT(HGRID_OK, hgrid_occluded_scene_n(&empty, rays, 0, occluded, 0, RAYS, coherence, NULL));
     CHECK(is_miss(&hits[0]) && is_miss(&hits[RAYS - 1]) && all_bytes_are(occluded, sizeof occluded, 0));

@@ -344,8 +344,8 @@ static void no_shape_batch(hgrid_status expected, const hgrid_shapes *of, size_t
     EXPECT(expected, hgrid_intersect_shapes_n(of, from, ray_stride, (hgrid_hit *)(void *)many_answers, hit_stride, MANY,
                                               how, options));
     EXPECT(expected,
-           hgrid_occluded_shapes_n(of, from, ray_stride, many_answers, hit_stride == 1 ? SIZE_MAX : hit_stride, MANY, how,
-                                   options));
+           hgrid_occluded_shapes_n(of, from, ray_stride, many_answers, hit_stride == 1 ? SIZE_MAX : hit_stride, MANY,
+                                   how, options));
     CHECK(all_bytes_are(many_answers, sizeof many_answers, 0xc7));
 }
 
@@ -365,7 +365,11 @@ static void what_batches_of_shapes_refuse(void)
     struct {
         void *scratch;
         size_t bytes;
-    } cases[] = {{many_answers, 1}, {shape_blob, 64}, {&spheres[7], 4}, {&spheres[7].mask, 4}, {&shapes, sizeof shapes}};
+    } cases[] = {{many_answers, 1},
+                 {shape_blob, 64},
+                 {&spheres[7], 4},
+                 {&spheres[7].mask, 4},
+                 {&shapes, sizeof shapes}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         options.scratch = cases[i].scratch, options.scratch_bytes = cases[i].bytes;
         no_shape_batch(HGRID_ERROR_OVERLAP, &shapes, 0, 0, how, &options);

@@ -107,7 +107,8 @@ int main(void)
         const hgrid_ray_f64 ray = {{(i % 8) + 0.25, (i / 8) + 0.25, 1}, {0, 0, -1}, 0, INFINITY, 0};
         wide_rays[i] = ray;
     }
-    if (trace_tile_of_scene(&scene, wide_rays, wide_hits) != 36 || wide_hits[0].t != depth[0] || wide_hits[0].path[0] != 0)
+    if (trace_tile_of_scene(&scene, wide_rays, wide_hits) != 36 || wide_hits[0].t != depth[0] ||
+        wide_hits[0].path[0] != 0)
         return 17;
     if (!sees_light_in_scene(&scene, &wide_rays[0], &wide_hits[0], up) ||
         sees_light_in_scene(&scene, &wide_rays[0], &wide_hits[0], down))

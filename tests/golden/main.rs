@@ -48,7 +48,8 @@ fn line(name: &str, mesh: &Mesh, config: &Config) -> String {
         others => others.method().name(),
     };
     format!(
-        "{name:8} {method:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
+        "{name:8} {method:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} \
+         {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
         grid.blob_bytes(),
         hash(&grid.blob()[HEADER_BYTES..]),
     )

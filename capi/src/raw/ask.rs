@@ -8,7 +8,7 @@ use hgrid_core::{
     ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
 };
 
-use super::batch_arrays::{Arrays, BatchArrays};
+use super::batch_arrays::{BatchArrays, RunningBatch};
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{
@@ -254,14 +254,14 @@ pub(crate) unsafe fn batch<T>(
     view: *const hgrid_grid,
     batch: &BatchArrays<hgrid_ray, T>,
     asked: *const hgrid_query_options,
-    trace: impl FnOnce(&Grid<'static>, &mut Arrays<'_, hgrid_ray, T>, &mut QueryOptions<'_>),
+    trace: impl FnOnce(&Grid<'static>, &mut RunningBatch<'_, hgrid_ray, T>, &mut QueryOptions<'_>),
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
     let asked = unsafe { all_options(asked) }?;
     // SAFETY: this function's contract, and any bytes are a ray.
-    let mut arrays = unsafe { Arrays::new(batch) };
+    let mut arrays = unsafe { RunningBatch::new(batch) };
     let Some(asked) = asked else {
         trace(grid, &mut arrays, &mut QueryOptions::default());
         return Ok(());

@@ -70,9 +70,9 @@ impl<R, T> BatchArrays<R, T> {
 }
 
 /// The arrays of a batch while it runs, as core asks for them.
-pub(crate) struct Arrays<'b, R, T>(&'b BatchArrays<R, T>);
+pub(crate) struct RunningBatch<'b, R, T>(&'b BatchArrays<R, T>);
 
-impl<'b, R, T> Arrays<'b, R, T> {
+impl<'b, R, T> RunningBatch<'b, R, T> {
     /// # Safety
     /// Until it is dropped, the elements of both arrays are the caller's to be read and written, and any bytes are an
     /// `R`.
@@ -81,7 +81,7 @@ impl<'b, R, T> Arrays<'b, R, T> {
     }
 }
 
-impl<A, T: From<A>, Q: From<R>, R> Batch<A, Q> for Arrays<'_, R, T> {
+impl<A, T: From<A>, Q: From<R>, R> Batch<A, Q> for RunningBatch<'_, R, T> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.0.count

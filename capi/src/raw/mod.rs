@@ -38,7 +38,7 @@ use core::slice;
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
 pub(crate) use ask::{batch, closest, locate, query, query_all, surface};
-pub(crate) use batch_arrays::{Arrays, BatchArrays};
+pub(crate) use batch_arrays::{BatchArrays, RunningBatch};
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,

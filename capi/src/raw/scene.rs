@@ -13,7 +13,7 @@ use hgrid_core::{
 };
 
 use super::ask::add;
-use super::batch_arrays::{Arrays, BatchArrays};
+use super::batch_arrays::{BatchArrays, RunningBatch};
 use super::shapes::shapes_read;
 use super::{
     apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, view_of, write, write_grid,
@@ -364,12 +364,12 @@ const _: () = assert!(align_of::<Member<'_>>() <= ALIGNMENT);
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<Member<'_>>());
 
 /// The options that a caller gave a query of a scene.
-struct Asked {
+struct SceneAsked {
     options: hgrid_scene_options,
     cull: Cull,
 }
 
-impl Asked {
+impl SceneAsked {
     /// Reads the options of a query of a scene; NULL means the defaults.
     ///
     /// # Safety
@@ -431,7 +431,7 @@ pub(crate) unsafe fn query_scene(
     // SAFETY: the caller's promise.
     let ray = unsafe { read(ray) }?.checked().into();
     // SAFETY: the caller's promise.
-    let asked = checked(unsafe { Asked::read(asked) })?;
+    let asked = checked(unsafe { SceneAsked::read(asked) })?;
     let find = |options: &mut SceneOptions<'_>| {
         if is_any {
             scene.occluded_with(&ray, options).then_some(SceneHit::MISS)
@@ -451,12 +451,12 @@ pub(crate) unsafe fn scene_batch<T>(
     view: *const hgrid_scene,
     batch: &BatchArrays<hgrid_ray_f64, T>,
     asked: *const hgrid_scene_options,
-    trace: impl FnOnce(&Scene<'static>, &mut Arrays<'_, hgrid_ray_f64, T>, &mut SceneOptions<'_>),
+    trace: impl FnOnce(&Scene<'static>, &mut RunningBatch<'_, hgrid_ray_f64, T>, &mut SceneOptions<'_>),
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
     // SAFETY: the caller's promise.
-    let asked = unsafe { Asked::read(asked) }?;
+    let asked = unsafe { SceneAsked::read(asked) }?;
     let hgrid_scene_options { scratch, scratch_bytes, .. } = asked.options;
     let scratch = Region { start: scratch, bytes: scratch_bytes };
     let span = scratch.span();
@@ -466,7 +466,7 @@ pub(crate) unsafe fn scene_batch<T>(
     // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
     let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
     // SAFETY: this function's contract, and any bytes are a ray.
-    let mut arrays = unsafe { Arrays::new(batch) };
+    let mut arrays = unsafe { RunningBatch::new(batch) };
     let trace = |options: &mut SceneOptions<'_>| {
         options.scratch = scratch;
         trace(scene, &mut arrays, options);

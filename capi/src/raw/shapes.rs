@@ -8,7 +8,7 @@ use core::ptr::NonNull;
 use hgrid_core::{Boxes, Hit, ObjectTest, QueryOptions, Ray, ShapeHit, Shapes, Sizes};
 
 use super::ask::all_options;
-use super::batch_arrays::{Arrays, BatchArrays};
+use super::batch_arrays::{BatchArrays, RunningBatch};
 use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, view_of, write};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
@@ -259,7 +259,7 @@ pub(crate) unsafe fn shapes_batch<T>(
     asked: *const hgrid_query_options,
     trace: impl FnOnce(
         &Shapes<'static>,
-        &mut Arrays<'_, hgrid_ray, T>,
+        &mut RunningBatch<'_, hgrid_ray, T>,
         &mut QueryOptions<'_>,
         &mut hgrid_core::ShapeTest<'_>,
     ),
@@ -269,7 +269,7 @@ pub(crate) unsafe fn shapes_batch<T>(
     // SAFETY: the caller's promise.
     let asked = unsafe { all_options(asked) }?;
     // SAFETY: this function's contract, and any bytes are a ray.
-    let mut arrays = unsafe { Arrays::new(batch) };
+    let mut arrays = unsafe { RunningBatch::new(batch) };
     let mut test = |id: u32, ray: &Ray| tested.test(id, ray);
     let Some(asked) = asked else {
         trace(&tested.shapes, &mut arrays, &mut QueryOptions::default(), &mut test);

@@ -1,9 +1,9 @@
 //! Many rays at once: from the caller's own structs, into the caller's own structs.
 //!
 //! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. A tree
-//! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are
-//! given or sorted first. If the closest hits are asked for and the origins lie far apart, it traces the rays of a group
-//! one by one, or in a large tree interleaved. The other methods trace one ray after the other.
+//! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are given or sorted
+//! first. If the closest hits are asked for and the origins lie far apart, it traces the rays of a group one by one, or
+//! in a large tree interleaved. The other methods trace one ray after the other.
 //!
 //! A filter sees all hits of one ray before those of the next, in the order of the rays. Groups keep this order:
 //!
@@ -29,15 +29,14 @@ use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::simd::HAS_VECTORS;
 
-/// The caller's hint about the rays of a batch, by which the grid chooses their order. The hint changes the speed, never
-/// the answers.
+/// The caller's hint about the rays of a batch, by which the grid chooses their order. The hint changes the speed,
+/// never the answers.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {
-    /// Nothing: random rays, rays after several bounces. A tree may sort them by origin and
-    /// direction, in windows of as many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the
-    /// larger, the sooner the answers, up to millions of rays. With less than
-    /// 4 KiB it sorts windows of 256 rays on the stack. Other methods trace each ray alone.
+    /// Nothing: random rays, rays after several bounces. A tree may sort them by origin and direction, in windows of as
+    /// many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the larger, the sooner the answers, up to millions
+    /// of rays. With less than 4 KiB it sorts windows of 256 rays on the stack. Other methods trace each ray alone.
     #[default]
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
@@ -241,8 +240,7 @@ impl Grid<'_> {
         Ok(())
     }
 
-    /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and
-    /// hits lie.
+    /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and hits lie.
     ///
     /// ```
     #[doc = include_str!("../../doc/grid.txt")]
@@ -298,8 +296,7 @@ impl Grid<'_> {
         self.occluded_n_with(rays, occluded, coherence, &mut QueryOptions::default())
     }
 
-    /// For each ray a byte: 1 if anything is hit that the options let count, 0 if not. The options
-    /// are for all rays.
+    /// For each ray a byte: 1 if anything is hit that the options let count, 0 if not. The options are for all rays.
     ///
     /// # Errors
     /// The same as of [`intersect_n`](Self::intersect_n).
@@ -355,8 +352,7 @@ impl Grid<'_> {
         Ok(())
     }
 
-    /// A triangle that blocks each ray: [`occluder_n_with`](Self::occluder_n_with), wherever rays and
-    /// answers lie.
+    /// A triangle that blocks each ray: [`occluder_n_with`](Self::occluder_n_with), wherever rays and answers lie.
     pub fn occluder_batch(
         &self,
         batch: &mut impl Batch<u32>,

@@ -21,7 +21,9 @@ pub(super) fn place_tasks(sizes: &mut [u32], counts: &mut [u32], bits: u32) {
     for (bin, &size) in sizes.iter().enumerate() {
         let next = &mut next[usize::from(size as usize <= CROWD)];
         for task in 0..counts.len() >> bits {
-            let Some(count) = counts.get_mut(task << bits | bin) else { continue };
+            let count =
+                counts.get_mut(task << bits | bin).or_bug("a bin of a task without a count");
+            let Some(count) = count else { continue };
             *next += core::mem::replace(count, *next);
         }
     }

@@ -221,12 +221,12 @@ fn build_in(
     let (ids, nodes) = cut_index(&mut index, finite);
     let scene = Lattice::pad(&bounds);
     let work = BuildInputs { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
-    let made = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
+    let roots = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
-    let made = work.top(entries, spare, nodes, &made);
-    let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
+    let tree = work.top(entries, spare, nodes, &roots);
+    let (node_count, levels) = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
     finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
 }
 
@@ -470,8 +470,8 @@ impl BuildInputs<'_> {
             part
         });
         let level = SimdLevel::detect();
-        let mut made = [const { None }; tasks::MOST];
-        let mut slots = made.iter_mut();
+        let mut results = [const { None }; tasks::MOST];
+        let mut slots = results.iter_mut();
         run_several(
             control,
             parts,
@@ -486,7 +486,7 @@ impl BuildInputs<'_> {
 
         // Move nodes and records together.
         let mut all = TaskTotals { nodes: 1, roots: 0, last: RootRecord::new_zeroed() };
-        for (made, last) in made.into_iter().flatten() {
+        for (made, last) in results.into_iter().flatten() {
             let moved = made.child - all.nodes;
             move_nodes(nodes, made.child..made.child + made.nodes, all.nodes);
             let to = all.roots as usize * RECORD;

@@ -13,7 +13,7 @@
 //!       then, whichever takes fewer vector tests:
 //!           ray by ray: each with all eight boxes
 //!           box by box: each that is undecided with sixteen rays at a time
-//!       push the children with the rays that met them, those that begin nearest last; in a large tree prefetch them
+//!       push the children with the rays that met them, for closest hits the nearest last; prefetch in a large tree
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
@@ -69,7 +69,7 @@ pub(super) const fn octets(rays: u64) -> u32 {
 pub(crate) struct GroupEntry {
     /// Node and slot.
     place: u32,
-    /// The least distance at which one of the rays enters.
+    /// The least distance at which one of the rays enters; any number if children may come in any order.
     near: f32,
     rays: u64,
 }
@@ -227,7 +227,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
 pub(super) struct Met {
     /// The boxes that any of them met, as bits.
     pub(super) slots: u32,
-    /// For each box the rays that met it, as bits, and where the first one enters.
+    /// For each box the rays that met it, as bits, and where the first one enters if that matters.
     pub(super) rays: [u64; WIDTH],
     pub(super) near: [f32; WIDTH],
 }

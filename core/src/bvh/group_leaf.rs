@@ -29,7 +29,7 @@ pub(super) struct Leaf<'r> {
     pub(super) ids: &'r [u32],
 }
 
-/// How rays that start far apart are traced.
+/// The treatment of rays that start far apart.
 #[derive(Clone, Copy)]
 pub(super) enum Scattered {
     /// As any group: rays for any hit share the first nodes, and many end soon.

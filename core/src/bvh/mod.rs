@@ -1,9 +1,8 @@
 //! A bounding volume hierarchy with eight children a node, built from a grid of the triangles' centres.
 //!
-//! Every triangle belongs to one cell of a grid, by its centre; crowded cells get a finer grid of their own.
-//! Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps
-//! the boxes of up to eight children in eight bits a side, a leaf up to eight ids; triangles stay in the
-//! caller's mesh.
+//! Every triangle belongs to one cell of a grid, by its centre; crowded cells get a finer grid of their own. Cells in
+//! Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes of up to eight
+//! children in eight bits a side, a leaf up to eight ids; triangles stay in the caller's mesh.
 //!
 //! ```text
 //! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side |

@@ -9,11 +9,10 @@
 //!                  not there       otherwise; its box is inside out, so rays do not meet it
 //! ```
 //!
-//! The quantised box holds the exact one and at least a sixty-fourth of a step more on each side.
-//! This margin absorbs the rounding of `bound * step + (origin - ray origin)` where the ray starts near the
-//! node: there the terms are below 2^9 steps, so three roundings are below 2^-13 steps. Where the ray
-//! starts far away, the error is relative, and the far side of a slab test has a margin for it
-//! ([`slab`](super::slab)).
+//! The quantised box holds the exact one and at least a sixty-fourth of a step more on each side. This margin absorbs
+//! the rounding of `bound * step + (origin - ray origin)` where the ray starts near the node: there the terms are below
+//! 2^9 steps, so three roundings are below 2^-13 steps. Where the ray starts far away, the error is relative, and the
+//! far side of a slab test has a margin for it ([`slab`](super::slab)).
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x4, u32x8};
@@ -30,8 +29,7 @@ pub(crate) const WIDTH: usize = 8;
 /// Ids in a leaf, at most: one vector of triangles.
 pub(crate) const LEAF: usize = 8;
 
-/// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one
-/// minimum.
+/// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one minimum.
 pub(crate) type Sides = [f32; 8];
 
 /// Up to eight children and their boxes.
@@ -295,8 +293,7 @@ impl<S: Simd> Quantiser<S> {
 
 /// The least margin of a quantised box around the exact one, in steps.
 const MARGIN: f32 = 1.0 / 64.0;
-/// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than
-/// their rounding.
+/// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than their rounding.
 const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
 
 /// Returns the exponent bits of a power of two: the next one above a 254th of an extent.

@@ -6,10 +6,9 @@
 //! sort    by key, where keys are equal by place: two passes over digits of nine bits
 //! ```
 //!
-//! Rays that follow one another then start near each other and go the same way, so that a group
-//! of them shares most of its nodes, and the next group finds them in the cache. Rays that are near each
-//! other as they are given are not sorted, nor are too few rays for groups to share anything: there sorting
-//! costs more than it gains.
+//! Rays that follow one another then start near each other and go the same way, so that a group of them shares most of
+//! its nodes, and the next group finds them in the cache. Rays that are near each other as they are given are not
+//! sorted, nor are too few rays for groups to share anything: there sorting costs more than it gains.
 
 use crate::aabb::Aabb;
 use crate::ray::Ray;
@@ -80,8 +79,7 @@ pub(crate) const fn window(memory: &[SortKey]) -> usize {
     if rays > i32::MAX as usize { i32::MAX as usize } else { rays }
 }
 
-/// Sorts `count` rays of a batch from `first` on, no more than a [`window`]; `None` if they are better
-/// taken as given.
+/// Sorts `count` rays of a batch from `first` on, no more than a [`window`]; `None` if they are better taken as given.
 ///
 /// Out of line: its counts take stack only while rays are sorted.
 #[inline(never)]

@@ -53,9 +53,9 @@ pub(crate) struct Rays {
     /// The growth of boxes that covers both: `spread + origin_error`.
     pub(crate) growth: f32,
     inverse: [PerRay; 3],
-    /// Minus the origin, relative to the center, times the inverse direction.
+    /// Minus the origin, relative to the centre, times the inverse direction.
     offset: [PerRay; 3],
-    /// The least and the greatest coordinate of the origins, relative to the center, on each axis.
+    /// The least and the greatest coordinate of the origins, relative to the centre, on each axis.
     origins: [[f32; 2]; 3],
     start: PerRay,
     end: PerRay,
@@ -83,7 +83,7 @@ const MOST_EXTENT: f32 = 16_777_216.0 * 16_777_216.0; // 2^48
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
-/// At most this many are decided one by one.
+/// The most pairs that are decided one by one.
 const FEW_PAIRS: usize = 2;
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
@@ -204,7 +204,7 @@ impl Rays {
         special
     }
 
-    /// Returns true if some origin lies farther from the center than a part of the extent.
+    /// Returns true if some origin lies farther from the centre than a part of the extent.
     pub(super) fn are_apart(&self, part: f32) -> bool {
         self.spread > part * (ROUNDINGS * self.extent)
     }
@@ -503,7 +503,7 @@ pub(crate) fn lanes(mask: u64) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The lowest bits.
+/// A mask of so many low bits, eight at most.
 #[inline(always)]
 const fn bits_below(count: usize) -> u64 {
     if count >= 8 { 0xff } else { (1 << count) - 1 }

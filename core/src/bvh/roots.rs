@@ -227,8 +227,8 @@ impl Roots<'_> {
             let next = &mut next[usize::from(*count as usize <= CROWD)];
             *next += core::mem::replace(count, *next);
         }
-        debug_assert!(self.spare.len() >= entries.len());
-        let Some(binned) = self.spare.get_mut(..entries.len()) else { return };
+        let binned = self.spare.get_mut(..entries.len()).or_bug("no room to bin");
+        let Some(binned) = binned else { return };
         for entry in &*entries {
             let head = counts.get_mut((entry[0] >> shift) as usize);
             if let Some(head) = head.or_bug("a key behind those of all bins") {

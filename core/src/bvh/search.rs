@@ -53,8 +53,7 @@ impl Bvh<'_> {
         self.walk(scope, ray, part, cull, Some(&afar), search, tally);
     }
 
-    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
-    /// meets.
+    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it meets.
     pub(crate) fn search_boxes(
         &self,
         scope: &Scope<'_>,

@@ -217,8 +217,7 @@ impl Subtree {
         }
     }
 
-    /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
-    /// each other.
+    /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for each other.
     #[inline(always)]
     fn cut(&mut self, at: usize, bits: u32, changes: impl Fn(u8) -> u128) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
@@ -260,8 +259,7 @@ impl Subtree {
         }
     }
 
-    /// Finds the boxes of a node's children, and its own, and names ids and nodes by where they lie in the
-    /// index.
+    /// Finds the boxes of a node's children, and its own, and names ids and nodes by where they lie in the index.
     #[inline(always)]
     fn quantise<S: Simd>(&mut self, simd: S, at: usize, places: [u32; 2], least: f32) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");

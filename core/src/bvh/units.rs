@@ -1,9 +1,14 @@
 //! Groups bins into units, each of which is cut into roots by itself.
 //!
 //! A unit should be a single bin: neighbours in Morton order may lie far apart, and a root over both has a large box.
-//! But the memory bound allows only one root for [`TRIANGLES_PER_ROOT`] triangles. A running balance keeps to it: each
-//! unit adds its triangles and subtracts that number for each of its roots. A bin that would make the balance negative
-//! joins the next bin.
+//! But the memory bound allows only one root for [`TRIANGLES_PER_ROOT`] triangles. A running balance keeps to it.
+//!
+//! ```text
+//! each crowded bin is a unit; balance = 0
+//! for each other bin: add it to the unit
+//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; 0 if it is more and a task may end here
+//!     if left is not negative, and no bin is behind or they have enough for a root: end the unit; balance = left
+//! ```
 
 use core::ops::Range;
 

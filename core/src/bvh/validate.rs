@@ -1,10 +1,16 @@
 //! Proof that a foreign blob is a tree of its mesh.
 //!
-//! A tree answers right if every finite triangle stands in a leaf, and every box on the way from the root to
-//! that leaf holds it, with the margin that the slab test relies on ([`node`](super::node)). One walk over
-//! all nodes checks this: for each level it keeps the intersection of the boxes above, and for each triangle
-//! one bit of scratch says whether a leaf had it. A second leaf with the same triangle is an error, so no sum
-//! has to be trusted, and a walk that ends has met each node once.
+//! A tree answers right if every finite triangle stands in a leaf, and every box on the way from the root to that leaf
+//! holds it, with the margin that the slab test relies on ([`node`](super::node)). One walk over all nodes checks this:
+//!
+//! ```text
+//! node   a build writes such a node; each child may fill its box, cut with the boxes above
+//! leaf   each triangle is finite, lies in what its leaf may fill, and has no bit in scratch yet: set it
+//! end    as many nodes and ids were met as there are
+//! ```
+//!
+//! A second leaf with the same triangle is an error, so no sum has to be trusted, and a walk that ends has met each
+//! node once.
 
 use glam::DVec3;
 

@@ -68,7 +68,7 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
-    /// Where the walk goes on; `None` at its begin.
+    /// The place to resume at; `None` at the start.
     pub(crate) resume: Option<Resume>,
 }
 
@@ -91,7 +91,7 @@ pub(crate) struct Resume {
     budget: usize,
 }
 
-/// How a walk ended.
+/// The outcome of a walk.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Walked {
     /// The ray has passed the tree, or the search is over.

@@ -1,5 +1,4 @@
-//! Macrocell levels: bit arrays that overlay coarser and coarser grids
-//! (CP10 §3.2, Wald et al. 2006).
+//! Macrocell levels: bit arrays that overlay coarser and coarser grids (CP10 §3.2, Wald et al. 2006).
 //!
 //! ```text
 //! level 0   the cells of the hashed grid, one domain bit each         303 x 213 x 135
@@ -7,9 +6,8 @@
 //! level 2   one bit for factor^3 bits of level 1                        9 x   6 x   4
 //! ```
 //!
-//! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`].
-//! They follow each other in one section, each starting at a new word; where one lies follows
-//! from the resolution and the factor.
+//! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`]. They follow each other
+//! in one section, each starting at a new word; where one lies follows from the resolution and the factor.
 
 use core::num::NonZeroU32;
 use core::ops::Range;
@@ -134,8 +132,7 @@ impl Levels {
     pub(super) fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]) {
         words.fill(0);
         let mut below = Level { resolution, start: 0 };
-        for number in 1..=self.count {
-            let level = self.level(number);
+        for (number, &level) in self.all.iter().enumerate().take(self.count) {
             let Some((lower, upper)) = usize::try_from(level.start)
                 .ok()
                 .and_then(|start| words.split_at_mut_checked(start))
@@ -143,7 +140,7 @@ impl Levels {
             else {
                 return;
             };
-            let from = if number == 1 { domain_bits } else { lower };
+            let from = if number == 0 { domain_bits } else { lower };
             scale_down(&below, from, &Level { start: 0, ..level }, upper, self.factor.get());
             below = level;
         }

@@ -230,8 +230,7 @@ impl<'a> TriangleMesh<'a> {
     }
 
     /// The same mesh with a mask for each triangle, a `u32`, which queries that have one look at
-    /// ([`QueryOptions::mask`](crate::QueryOptions::mask)). Without
-    /// masks every triangle has all bits.
+    /// ([`QueryOptions::mask`](crate::QueryOptions::mask)). Without masks every triangle has all bits.
     ///
     /// # Errors
     /// [`Error::InvalidMesh`] if there are not as many masks as triangles, the stride is below four
@@ -382,8 +381,7 @@ impl<'a> TriangleMesh<'a> {
         })
     }
 
-    /// Returns true if all coordinates of all vertices, used or not, are finite and no larger than
-    /// `MAX_COORDINATE`.
+    /// Returns true if all coordinates of all vertices, used or not, are finite and no larger than `MAX_COORDINATE`.
     pub(crate) fn is_finite(&self) -> bool {
         let limit = MAX_COORDINATE;
         let is_finite = |xyz: [f32; 3]| xyz.iter().all(|c| c.abs() <= limit);

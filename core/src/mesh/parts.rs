@@ -79,15 +79,13 @@ impl Totals {
 impl<'a> TriangleMesh<'a> {
     /// Numbers the triangles of some meshes through all of them, and makes them one mesh.
     ///
-    /// A hit of its grid names a triangle by that number, and [`locate`](Self::locate) tells which mesh it
-    /// is of and which triangle there. Where several triangles are equally close, the first mesh wins. Each
-    /// mesh has strides and an index type of its own, and masks or none. No vertex is copied. One mesh alone is
-    /// read faster than parts are.
+    /// A hit of its grid names a triangle by that number, and [`locate`](Self::locate) tells which mesh it is of and
+    /// which triangle there. Where several triangles are equally close, the first mesh wins. Each mesh has strides and
+    /// an index type of its own, and masks or none. No vertex is copied. One mesh alone is read faster than parts are.
     ///
     /// # Errors
-    /// [`Error::TooManyTriangles`] counts all parts. [`Error::InvalidMesh`] with
-    /// [`MeshField::Parts`]: a part is joined itself, there are more than 2^30 - 1 parts, or more than
-    /// 2^32 - 1 vertices in all.
+    /// [`Error::TooManyTriangles`] counts all parts. [`Error::InvalidMesh`] with [`MeshField::Parts`]: a part is joined
+    /// itself, there are more than 2^30 - 1 parts, or more than 2^32 - 1 vertices in all.
     ///
     /// ```
     /// use hgrid_core::{MeshPart, TriangleMesh};

@@ -62,8 +62,7 @@ impl<'a> Strided<'a> {
     /// No elements.
     pub(super) const NONE: Self = Self { bytes: &[], stride: 0, count: 0 };
 
-    /// The same elements of `size` bytes without the bytes after the
-    /// last of them, if all lie inside.
+    /// The same elements of `size` bytes without the bytes after the last of them, if all lie inside.
     pub(crate) fn cut(self, size: usize) -> Option<Self> {
         let Some(last) = self.count.checked_sub(1) else {
             return Some(Self { bytes: &[], ..self });

@@ -11,10 +11,9 @@
 //! The plan touches only the scratch, so a build that runs out of index memory has written nothing
 //! there and knows exactly what it needs.
 //!
-//! The number of references has no bound in the number of triangles: a million triangles that each
-//! span the scene would fill every cell a million times. [`reference_limit`] is the promise that
-//! this does not happen: a mesh that would need more is built with half the density, again and
-//! again until it fits. Scans never come near it.
+//! The number of references has no bound in the number of triangles: a million triangles that each span the scene would
+//! fill every cell a million times. [`reference_limit`] is the promise that this does not happen: a mesh that would
+//! need more is built with half the density, again and again until it fits. Scans never come near it.
 
 use super::displacement::displace;
 use super::layout::{Layout, Scratch};

@@ -75,8 +75,7 @@ impl Kernel for Displace<'_> {
                 cleared = end.max(behind);
             }
 
-            // Take the first hole in the window that the row fits into;
-            // behind the table it always does.
+            // Take the first hole in the window that the row fits into; behind the table it always does.
             let window = slots.saturating_sub(WINDOW_SLOTS) / WORD_BITS;
             let mut word = window.max(first_free_word);
             let slot = loop {
@@ -103,8 +102,7 @@ impl Kernel for Displace<'_> {
     }
 }
 
-/// Words that are cleared beyond those that are needed, so that it is seldom
-/// done: 512 bytes, an eighth of a page.
+/// Words that are cleared beyond those that are needed, so that it is seldom done: 512 bytes, an eighth of a page.
 const CLEARED_WORDS: usize = 64;
 
 /// Words in a vector.

@@ -13,8 +13,7 @@ use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
 
-/// The cells of a primitive: the row and the place in it of the first, and how
-/// many more there are on each axis.
+/// The cells of a primitive: the row and the place in it of the first, and how many more there are on each axis.
 #[derive(Debug, Clone, Copy)]
 struct CellSpan {
     row: usize,

@@ -1,9 +1,15 @@
 //! Spreading primitives over cells: mark, count, and sort them into lists.
 //!
-//! Two passes of a compact grid (LD08) over a hash table: count the references of every slot, sum
-//! up, and fill in reverse, so that every list ascends. The primitives come from a
-//! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid;
-//! batch after batch of them is placed (`placed.rs`) and then spread.
+//! Two passes of a compact grid (LD08) over a hash table:
+//!
+//! ```text
+//! count    for each primitive and each of its cells: hash[slot of the cell] += 1
+//! sum up   hash[slot] += hash[slot - 1]: where the list of the slot ends
+//! fill     for each primitive, the last first, and each of its cells: references[--hash[slot of the cell]] = primitive
+//! ```
+//!
+//! So every list ascends, and the table says where it starts. The primitives come from a [`Spread`]: the triangles of a
+//! mesh over a lattice, or those of one cell over a subgrid; batch after batch is placed (`placed.rs`) and then spread.
 
 use core::ops::Range;
 
@@ -50,8 +56,7 @@ pub(crate) fn mark(
     })
 }
 
-/// Counts the references of a grid, showing every batch to `visit`; `None` if there are more than
-/// `limit`.
+/// Counts the references of a grid, showing every batch to `visit`; `None` if there are more than `limit`.
 #[inline(always)]
 pub(crate) fn count_references(
     spread: &dyn Spread,

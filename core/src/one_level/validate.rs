@@ -5,11 +5,10 @@
 //! list, so no pair is listed twice. So all pairs are there if and only if there are as many as the ranges have cells.
 //! This takes no bitmap and no sorting: it compares one sum with another.
 //!
-//! Two cells with equal lists could still share a slot while another slot stays orphaned. A sum of
-//! scrambled slot numbers over the cells and one over the slots with lists tell accidents of that
-//! kind. An attacker can make the two sums equal, so nothing rests on them: the answers
-//! are right either way, and as the lists of all cells have as many ids as the blob, no query is
-//! shown more. Where among the free slots a row came to lie is not checked, either.
+//! Two cells with equal lists could still share a slot while another slot stays orphaned. A sum of scrambled slot
+//! numbers over the cells and one over the slots with lists tell accidents of that kind. An attacker can make the two
+//! sums equal, so nothing rests on them: the answers are right either way, and as the lists of all cells have as many
+//! ids as the blob, no query is shown more. Where among the free slots a row came to lie is not checked, either.
 
 use super::spread::count_references;
 use super::triangles::MeshSpread;

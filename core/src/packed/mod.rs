@@ -7,11 +7,10 @@
 //!                                                   if it has any     mesh was joined
 //! ```
 //!
-//! Every section starts at a multiple of 64, as in the grid, which is the one that was built but
-//! for its header. The mesh is tight and its indices have 32 bits, whatever the caller's had. Parts that were
-//! joined become one mesh: of each only the number of its first triangle is kept, so that
-//! [`TriangleMesh::locate`] answers as before.
-//! Opening reads it where it lies, so there is still no copy and no allocation.
+//! Every section starts at a multiple of 64, as in the grid, which is the one that was built but for its header. The
+//! mesh is tight and its indices have 32 bits, whatever the caller's had. Parts that were joined become one mesh: of
+//! each only the number of its first triangle is kept, so that [`TriangleMesh::locate`] answers as before. Opening
+//! reads it where it lies, so there is still no copy and no allocation.
 
 mod scene;
 
@@ -135,9 +134,8 @@ impl<'a> Grid<'a> {
     /// and [`TriangleMesh::locate`] still tells which part a triangle is of.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is
-    /// no multiple of [`ALIGNMENT`], [`Error::IndexOutOfRange`] a triangle without
-    /// vertices. Nothing is written then.
+    /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of [`ALIGNMENT`],
+    /// [`Error::IndexOutOfRange`] a triangle without vertices. Nothing is written then.
     ///
     /// ```
     #[doc = include_str!("../../doc/grid.txt")]
@@ -182,9 +180,8 @@ impl<'a> Grid<'a> {
 
     /// Opens a blob that [`pack`](Self::pack) wrote, in O(1): the mesh is its own.
     ///
-    /// The remarks of [`open`](Self::open) on damaged bytes hold here, too;
-    /// [`validate`](Self::validate) proves that the grid is one of the mesh
-    /// behind it, whatever mesh that is.
+    /// The remarks of [`open`](Self::open) on damaged bytes hold here, too; [`validate`](Self::validate) proves that
+    /// the grid is one of the mesh behind it, whatever mesh that is.
     ///
     /// # Errors
     /// The errors of [`open`](Self::open), and [`Error::NoMesh`].

@@ -54,8 +54,7 @@ const fn scratch_words(primitives: u32, density: f32) -> u64 {
     cells.saturating_add(64 + 1 + reference_limit(primitives) as u64)
 }
 
-/// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
-/// level.
+/// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each level.
 const fn most_scratch(triangles: u32, density: f32, depth: u32) -> u64 {
     let level = scratch_words(triangles, density);
     section_bytes::<u32>((triangles as u64).saturating_add(level.saturating_mul(depth as u64)))
@@ -381,10 +380,9 @@ impl Builder<'_, '_> {
 
     /// Puts a grid of these primitives in this box into the pool, and all grids in it.
     ///
-    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its cells hold on
-    /// average more than three quarters of the primitives, as in a pile of equal triangles. Likewise where it would
-    /// look at more than `looks` cells. It subtracts the cells that it looked at from `looks`. The root is always
-    /// put.
+    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its cells hold on average
+    /// more than three quarters of the primitives, as in a pile of equal triangles. Likewise where it would look at
+    /// more than `looks` cells. It subtracts the cells that it looked at from `looks`. The root is always put.
     fn grid(
         &mut self,
         ids: &[u32],

@@ -1,10 +1,9 @@
 //! The recursive grid that the paper compares with: Manta's (Bigler 2006; resolution after Ize,
 //! Shirley, Parker 2007), uncompressed, depth 3.
 //!
-//! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its
-//! own, around the part of the cell that they reach, until the depth is used up. Primitives are
-//! listed only in cells that they really overlap. The best traversal of the paper's methods, the
-//! longest build and several times the memory.
+//! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its own, around the part
+//! of the cell that they reach, until the depth is used up. Primitives are listed only in cells that they really
+//! overlap. The best traversal of the paper's methods, the longest build and several times the memory.
 //!
 //! ```text
 //! blob | header | pool |

@@ -5,7 +5,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::bump::GRID;
 use crate::cell::{CellRange, as_f32, cells_between, row};
-use crate::dda::{Line, Walk};
+use crate::dda::{CellWalk, Line};
 use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
 
 pub(super) const HEAD_WORDS: usize = 7;
@@ -100,7 +100,7 @@ impl GridNode {
 
     /// A walk through this grid along a line of the root, from `entered` or where it enters.
     #[inline]
-    pub(super) fn walk(&self, line: &Line, entered: f32) -> Option<Walk> {
+    pub(super) fn walk(&self, line: &Line, entered: f32) -> Option<CellWalk> {
         line.zoom(self.origin, self.scale).walk_in(entered, self.resolution)
     }
 

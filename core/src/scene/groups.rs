@@ -27,7 +27,7 @@ use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::shapes::groups::offer_shapes;
 use crate::simd::SimdLevel;
 
-/// At most this many rays are asked for one by one.
+/// The most rays that are asked for one by one.
 const FEW: u32 = 2;
 
 /// Answers all rays of a batch.

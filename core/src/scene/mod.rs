@@ -256,7 +256,7 @@ struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// From the outermost scene on.
+    /// The instances from that of the outermost scene on.
     fn instances(&self) -> impl DoubleEndedIterator<Item = &'a StoredInstance> {
         self.instances.into_iter().flatten()
     }

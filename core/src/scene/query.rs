@@ -253,7 +253,7 @@ pub(super) struct InstanceSearch<'q, 'f> {
     pub(super) level: usize,
     pub(super) parameters: &'q QueryParameters,
     pub(super) best: Option<SceneHit>,
-    /// Nothing farther matters.
+    /// The `t` behind which nothing matters.
     pub(super) limit: f32,
     pub(super) filter: Option<&'q mut HitFilter<'f>>,
     pub(super) counters: Option<&'q mut Counters>,

@@ -1,14 +1,14 @@
-//! The point where a ray met a triangle of an instance, and the starts of the next rays.
+//! The point where a ray met a triangle of an instance, and the origins of the next rays.
 //!
-//! As in a single mesh ([`surface`](crate::surface)), a start lies above the triangle's plane, in the space of its
-//! object. But the query of the next ray moves the start from the scene into this space and rounds it to f32, which may
-//! put it below the plane. So `surface` does the same to each start beforehand, and doubles its lift until it stays
-//! above:
+//! As in a single mesh ([`surface`](crate::surface)), an origin lies above the triangle's plane, in the space of its
+//! object. But the query of the next ray moves the origin from the scene into this space and rounds it to f32, which
+//! may put it below the plane. So `surface` does the same to each origin beforehand, and doubles its lift until it
+//! stays above:
 //!
 //! ```text
-//! lift = that of a start in the mesh
-//! loop: start = point + lift * normal, moved to the scene
-//!       seen  = start, moved to the object as a query does
+//! lift = that of an origin in the mesh
+//! loop: origin = point + lift * normal, moved to the scene
+//!       seen   = origin, moved to the object as a query does
 //!       done if seen is less than half the lift from where it should be; else lift = 2 * lift
 //! ```
 
@@ -26,9 +26,9 @@ use crate::surface::Facet;
 pub struct SceneSurface {
     /// The point, in the scene.
     pub position: [f64; 3],
-    /// Start for rays that leave on the side that the ray came from: reflections, and rays to lights.
+    /// Origin for rays that leave on the side that the ray came from: reflections, and rays to lights.
     pub above: [f64; 3],
-    /// Start for rays that go on through the triangle.
+    /// Origin for rays that go on through the triangle.
     pub below: [f64; 3],
     /// The triangle's normal in the scene, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
@@ -37,15 +37,15 @@ pub struct SceneSurface {
 }
 
 impl Scene<'_> {
-    /// The point where a ray met a triangle of this scene, with starts for the rays that leave it.
+    /// The point where a ray met a triangle of this scene, with origins for the rays that leave it.
     ///
     /// `None` if the hit names no triangle, if the ray has no direction, or if coordinates are too coarse to tell the
     /// sides of the triangle apart: f64 at this distance from the scene's origin, or f32 in the object.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
     /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the
-    /// plane, as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in
-    /// a mesh, or by up to four times the rounding error of its transformation, if that is more. Do not round a start
+    /// plane, as the object sees them, may hit it, because normal and direction are rounded. An origin is lifted as in
+    /// a mesh, or by up to four times the rounding error of its transformation, if that is more. Do not round an origin
     /// to f32: it may lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says
     /// about triangles without area holds here, too.
     ///
@@ -97,7 +97,7 @@ impl Place<'_> {
         self.instances().rev().try_fold(normal, turned)
     }
 
-    /// The start on a side of a facet, 1 above and -1 below.
+    /// The origin on a side of a facet, 1 above and -1 below.
     fn start(&self, facet: &Facet, side: f64, extent: f64) -> Option<DVec3> {
         let mut lift = facet.lift;
         // A lift larger than the object is of no use: give up.

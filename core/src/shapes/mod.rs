@@ -31,9 +31,8 @@ use crate::sizes::sizes_with;
 
 /// A view of the boxes of the caller's shapes: six floats each, two opposite corners.
 ///
-/// A box should hold all of its shape. Its corners may come in any order on each axis; a box with a number
-/// that is not finite, or above [`MAX_COORDINATE`](crate::MAX_COORDINATE), leaves its shape out, as the
-/// triangle of a mesh.
+/// A box should hold all of its shape. Its corners may come in any order on each axis; a box with a number that is not
+/// finite, or above [`MAX_COORDINATE`](crate::MAX_COORDINATE), leaves its shape out, as the triangle of a mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Boxes<'a>(TriangleMesh<'a>);
 
@@ -63,8 +62,7 @@ impl<'a> Boxes<'a> {
         Ok(Self(TriangleMesh::of_boxes(boxes, Content::Shapes)?))
     }
 
-    /// The same boxes with a mask for each shape, as
-    /// [`TriangleMesh::with_masks`](crate::TriangleMesh::with_masks).
+    /// The same boxes with a mask for each shape, as [`TriangleMesh::with_masks`](crate::TriangleMesh::with_masks).
     ///
     /// # Errors
     /// [`Error::InvalidMesh`] of the masks.

@@ -1,5 +1,4 @@
-//! Building a variable grid: a one-level plan, its lists in the scratch, then cell by cell into the
-//! pool.
+//! Building a variable grid: a one-level plan, its lists in the scratch, then cell by cell into the pool.
 //!
 //! ```text
 //! scratch | plan of the top | hash | references | owners of slots | rows, bits, slots of a subgrid |

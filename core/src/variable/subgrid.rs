@@ -13,7 +13,7 @@ use glam::Vec3A;
 
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, as_f32, cells_between, row, woo};
-use crate::dda::{Line, Walk};
+use crate::dda::{CellWalk, Line};
 use crate::lists::pairs;
 use crate::one_level::{slot, slots_are_sound};
 use crate::visit::Visitor;
@@ -178,7 +178,7 @@ impl<'a> Subgrid<'a> {
 
     /// A walk along a line through this subgrid, or `None` if the line passes it.
     #[inline]
-    pub(super) fn walk(&self, line: &Line, around: &Walk) -> Option<Walk> {
+    pub(super) fn walk(&self, line: &Line, around: &CellWalk) -> Option<CellWalk> {
         let (origin, scale) = self.frame.zoom(around.cell());
         let zoomed = line.zoom(origin.to_array(), scale.to_array());
         zoomed.walk_in(around.entered, self.frame.resolution)

@@ -1,9 +1,8 @@
 //! Proof that a foreign blob is a variable grid of its mesh.
 //!
 //! The same count as for one level, over the cells of the top and of the subgrids: every listed triangle covers the
-//! cell that lists it and none is listed twice, so there are as many of them as the triangles have cells if and only
-//! if none is missing. Only lists that a cell names are counted. A table may hold further lists, which no query
-//! reads.
+//! cell that lists it and none is listed twice, so there are as many of them as the triangles have cells if and only if
+//! none is missing. Only lists that a cell names are counted. A table may hold further lists, which no query reads.
 //!
 //! The words of all cells together are the words of the pool, and those of a subgrid's lists the words behind its
 //! table. Queries rely on that: a query stops once it was shown more words than the pool has, so that it ends on
@@ -153,8 +152,7 @@ impl Inside<'_> {
         )
     }
 
-    /// The ids in the lists of all cells; `None` unless every list ascends and its triangles cover
-    /// its cell.
+    /// The ids in the lists of all cells; `None` unless every list ascends and its triangles cover its cell.
     fn listed(&self) -> Option<u64> {
         let mut listed = 0;
         let are_right = self.lists().all(|(sub, ids)| {

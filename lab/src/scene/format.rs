@@ -172,7 +172,8 @@ const FOREIGN: [(&[u8], &str); 19] = [
 ];
 
 fn foreign(start: &[u8]) -> Option<&'static str> {
-    // PPM and its like: P, a digit, a white space, then a size or a comment. A binary STL file may begin with any words.
+    // PPM and its like: P, a digit, a white space, then a size or a comment. A binary STL file may begin with any
+    // words.
     if let [b'P', b'1'..=b'6', space, next, ..] = start
         && space.is_ascii_whitespace()
         && (next.is_ascii_digit() || *next == b'#')

@@ -56,47 +56,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     let honest = Control { tasks, run: &serial, progress: None };
     let caller = run.for_core();
     let odd = Control { tasks, run: &caller, progress: None };
-
-    let bound = Sizes::bound_parallel(mesh.triangle_count(), config, tasks);
-    let enough = match sizes_with(&mesh, config, &mut [], &honest) {
-        Ok(enough) => enough,
-        Err(error) => {
-            // If sizes fail, the build fails for the same reason.
-            let (mut index, mut scratch) = (Guarded::new(4096), Guarded::new(4096));
-            let result = Grid::build_with(mesh, config, index.region(), scratch.region(), &honest);
-            assert!(result.is_err_and(|again| is_same(error, again)), "{error:?}");
-            assert!(index.around_is_intact() && scratch.around_is_intact());
-            return;
-        }
-    };
-    if let Some(bound) = bound {
-        assert!(enough.index_bytes <= bound.index_bytes, "{enough:?}, not {bound:?}");
-        assert!(enough.scratch_bytes <= bound.scratch_bytes, "{enough:?}, not {bound:?}");
-    }
-    if enough.scratch_bytes > MOST_BYTES {
-        return;
-    }
-    let mut scratch = Guarded::new(enough.scratch_bytes);
-    // The bound of a tree needs no look at the mesh; with several tasks the answer is a bound even if there
-    // is scratch.
-    let is_tree = config.method() == Method::Bvh;
-    if is_tree && let Err(error) = sizes(&mesh, config, scratch.region()) {
-        let is_odd =
-            matches!(error, Error::IndexOutOfRange { .. } | Error::NonFiniteTriangle { .. });
-        return assert!(is_odd, "{error:?}");
-    }
-    let exact = match sizes_with(&mesh, config, scratch.region(), &honest) {
-        Ok(exact) => exact,
-        // An invalid configuration may only show in the full computation.
-        Err(error) => return assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}"),
-    };
-    // With several tasks, the bound covers any mesh.
-    let is_exact = !is_tree || tasks < 2;
-    assert!(exact.is_exact == is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?}");
-    assert!(exact.scratch_bytes <= enough.scratch_bytes, "{exact:?} {enough:?}");
-    if exact.index_bytes > MOST_BYTES {
-        return;
-    }
+    let Some((exact, mut scratch)) = sized(mesh, config, &honest) else { return };
 
     // A loop that does not do its work is found out, or was not needed.
     if !run.is_right() {
@@ -114,7 +74,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
             assert!(needed_bytes >= exact.index_bytes as u64, "{needed_bytes} {exact:?}");
         }
-        Ok(_) if !is_exact => {}
+        Ok(_) if !exact.is_exact => {}
         other => panic!("{other:?} in too little memory"),
     }
     assert!(small.around_is_intact() && scratch.around_is_intact());
@@ -157,6 +117,59 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     let mut rays = rays::fixed_rays(grid.bounds(), 6);
     rays.extend(rays::chosen(u, &grid).unwrap_or_default());
     agrees(&grid, &rays);
+}
+
+/// Returns the sizes of a build and its scratch; `None` if the build fails, or takes more memory than is built with.
+fn sized(
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    honest: &Control<'_>,
+) -> Option<(Sizes, Guarded)> {
+    let bound = Sizes::bound_parallel(mesh.triangle_count(), config, honest.tasks);
+    let enough = match sizes_with(&mesh, config, &mut [], honest) {
+        Ok(enough) => enough,
+        Err(error) => {
+            // If sizes fail, the build fails for the same reason.
+            let (mut index, mut scratch) = (Guarded::new(4096), Guarded::new(4096));
+            let result = Grid::build_with(mesh, config, index.region(), scratch.region(), honest);
+            assert!(result.is_err_and(|again| is_same(error, again)), "{error:?}");
+            assert!(index.around_is_intact() && scratch.around_is_intact());
+            return None;
+        }
+    };
+    if let Some(bound) = bound {
+        assert!(enough.index_bytes <= bound.index_bytes, "{enough:?}, not {bound:?}");
+        assert!(enough.scratch_bytes <= bound.scratch_bytes, "{enough:?}, not {bound:?}");
+    }
+    if enough.scratch_bytes > MOST_BYTES {
+        return None;
+    }
+    let mut scratch = Guarded::new(enough.scratch_bytes);
+    // The bound of a tree needs no look at the mesh; with several tasks the answer is a bound even if there
+    // is scratch.
+    let is_tree = config.method() == Method::Bvh;
+    if is_tree && let Err(error) = sizes(&mesh, config, scratch.region()) {
+        let is_odd =
+            matches!(error, Error::IndexOutOfRange { .. } | Error::NonFiniteTriangle { .. });
+        assert!(is_odd, "{error:?}");
+        return None;
+    }
+    let exact = match sizes_with(&mesh, config, scratch.region(), honest) {
+        Ok(exact) => exact,
+        // An invalid configuration may only show in the full computation.
+        Err(error) => {
+            assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}");
+            return None;
+        }
+    };
+    // With several tasks, the bound covers any mesh.
+    let is_exact = !is_tree || honest.tasks < 2;
+    assert!(exact.is_exact == is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?}");
+    assert!(exact.scratch_bytes <= enough.scratch_bytes, "{exact:?} {enough:?}");
+    if exact.index_bytes > MOST_BYTES {
+        return None;
+    }
+    Some((exact, scratch))
 }
 
 /// Returns true if the errors are equal, or if the second one, that of the build, is too little memory.

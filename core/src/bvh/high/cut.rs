@@ -15,6 +15,7 @@ use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 use crate::bvh::node::Sides;
 use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
+use crate::invariant::OrBug;
 
 /// A triangle during a build, as bits: the least corner of its box, its id, the negated greatest corner, 0.
 pub(super) type TriangleItem = [u32; 8];
@@ -50,12 +51,12 @@ impl Extent {
 }
 
 /// Bins of an axis, at most.
-const BINS: usize = 32;
+const MOST_BINS: usize = 32;
 
 /// The bins of a range on each axis.
 pub(super) struct Bins {
-    boxes: [[Sides; BINS]; 3],
-    counts: [[u32; BINS]; 3],
+    boxes: [[Sides; MOST_BINS]; 3],
+    counts: [[u32; MOST_BINS]; 3],
 }
 
 /// The box of an item without its id, which may be a denormal number: these are slow.
@@ -136,7 +137,7 @@ impl BinScale {
 /// The low bits of a number that was rounded.
 #[inline(always)]
 const fn bin(place: f32) -> usize {
-    place.to_bits() as usize % BINS
+    place.to_bits() as usize % MOST_BINS
 }
 
 /// A split of a range: bins of an axis from this one on are the second part.
@@ -149,7 +150,7 @@ struct Split {
 
 impl Bins {
     pub(super) const fn new() -> Self {
-        Self { boxes: [[NOTHING; BINS]; 3], counts: [[0; BINS]; 3] }
+        Self { boxes: [[NOTHING; MOST_BINS]; 3], counts: [[0; MOST_BINS]; 3] }
     }
 
     /// Cuts some items in two and returns how many are in the first part, and the extents of both; `None` if no bins
@@ -191,9 +192,9 @@ impl Bins {
             let sides = load(simd, item);
             let [x, y, z] = rule.bins_of(simd, sides);
             for (axis, at) in [(0, x), (1, y), (2, z)] {
-                let bin = &mut self.boxes[axis][at % BINS];
+                let bin = &mut self.boxes[axis][at % MOST_BINS];
                 *bin = f32x8::simd_from(simd, *bin).lesser(sides).into();
-                self.counts[axis][at % BINS] += 1;
+                self.counts[axis][at % MOST_BINS] += 1;
             }
         }
     }
@@ -201,14 +202,14 @@ impl Bins {
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
     fn best<S: Simd>(&self, simd: S, rule: &BinScale, scale: f32) -> Option<Split> {
-        debug_assert!(rule.count <= BINS, "more bins than there is room for");
+        debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
         let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
             if rule.scale[axis % 3] >= f32::MAX {
                 continue;
             }
             // Costs of what is before each bin; infinite where nothing is.
-            let mut costs = [f32::INFINITY; BINS];
+            let mut costs = [f32::INFINITY; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             let bins = boxes.iter().zip(counts).take(rule.count);
             for ((bin, counted), cost) in bins.zip(&mut costs) {
@@ -246,6 +247,7 @@ fn partition<S: Simd>(
     let nothing = f32x8::splat(simd, f32::INFINITY);
     let (mut first, mut second, mut middle) = (nothing, nothing, 0);
     for at in 0..items.len() {
+        debug_assert!(middle <= at, "more items in the first part than were looked at");
         let (Some(&item), Some(&other)) = (items.get(at), items.get(middle)) else { break };
         // No branch: the side of an item is unpredictable.
         let is_first = rule.bin_of(&item, cut.axis) < cut.bin;
@@ -253,10 +255,10 @@ fn partition<S: Simd>(
         let center = center(load(simd, &item));
         first = first.lesser(mask.select(center, nothing));
         second = second.lesser(mask.select(nothing, center));
-        if let Some(slot) = items.get_mut(at) {
+        if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
             *slot = if is_first { other } else { item };
         }
-        if let Some(slot) = items.get_mut(middle) {
+        if let Some(slot) = items.get_mut(middle).or_bug("a place behind the items") {
             *slot = if is_first { item } else { other };
         }
         middle += usize::from(is_first);
@@ -269,6 +271,6 @@ const fn bin_count(items: usize) -> usize {
     match items {
         0..=32 => 8,
         33..=256 => 16,
-        _ => BINS,
+        _ => MOST_BINS,
     }
 }

@@ -21,11 +21,12 @@ use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
-/// Levels from which on ranges are halved.
-const DEEP: u32 = 24;
+/// The level from which on ranges are halved.
+const HALVED_FROM: u32 = 24;
 
-/// Levels of nodes, at most. Where parts are halved, a level divides a range by eight, so ten levels reach the leaves.
-pub(super) const MOST_LEVELS: u32 = DEEP + 11;
+/// Levels of nodes, at most. Where parts are halved, a level divides a range by eight, so ten levels reach the leaves
+/// from 2^31 triangles; one is to spare.
+pub(super) const MOST_LEVELS: u32 = HALVED_FROM + 11;
 
 const _: () = assert!(MOST_LEVELS <= LEVELS);
 
@@ -197,7 +198,7 @@ impl Grow<'_> {
         let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
         let extent = Extent::of(simd, all);
         parts[0] = SubRange { start: job.start, end: job.end, extent, area: 0.0 };
-        let halve = job.level >= DEEP;
+        let halve = job.level >= HALVED_FROM;
         for count in 1..WIDTH {
             let Some(at) = choose(&parts, halve) else { break };
             let at = at % WIDTH;
@@ -233,7 +234,8 @@ impl Grow<'_> {
 #[inline(always)]
 fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
     let middle = items.len() / 2;
-    let (first, second) = items.split_at_checked(middle).unwrap_or_default();
+    let halves = items.split_at_checked(middle).or_bug("a middle behind the items");
+    let (first, second) = halves.unwrap_or_default();
     (middle, [Extent::of(simd, first), Extent::of(simd, second)])
 }
 

@@ -1,5 +1,4 @@
-//! The build of quality high, for trees that many rays traverse: binned SAH from the root down, over single
-//! triangles.
+//! The build of quality high, for trees that many rays traverse: binned SAH from the root down, over single triangles.
 //!
 //! ```text
 //! boxes     the box of each triangle, with its id: an item                  (mod.rs)
@@ -10,11 +9,10 @@
 //! scratch | items: 32 B a triangle, those of a range that is done make way for its record  |
 //! ```
 //!
-//! A node cuts the range of its triangles until it has eight children, and only a range of nine or more is a node.
-//! So `n` triangles have one node, or (n - 2) / 7 at most. By induction: of the eight children `j` are nodes over
-//! all triangles but 8 - j or more; for `j` = 0 one node is enough, and otherwise there are
-//! 1 + (n - (8 - j) - 2 j) / 7 = (n - 1 - j) / 7 at most. A chain of nodes with seven leaves of one triangle has
-//! as many.
+//! A node cuts the range of its triangles until it has eight children, and only a range of nine or more is a node. So
+//! `n` triangles have one node, or (n - 2) / 7 at most. By induction: of the eight children `j` are nodes over all
+//! triangles but 8 - j or more; for `j` = 0 one node is enough, and otherwise there are 1 + (n - (8 - j) - 2 j) / 7 =
+//! (n - 1 - j) / 7 at most. A chain of nodes with seven leaves of one triangle has as many.
 //!
 //! The tree does not depend on the number of tasks: the ranges that tasks take are the same for any number, and
 //! their nodes end up side by side in the order of the triangles.
@@ -322,20 +320,33 @@ impl HighInputs {
             least: self.least,
         };
         let level = SimdLevel::detect();
-        let Grown { root, nodes: below, ids: top_ids, mut levels } = dispatch(level, grow);
+        let Grown { root, nodes: below, ids: top_ids, levels } = dispatch(level, grow);
         // Empty `nodes` and `ids` are legal, here and below: they are only counted then.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
         let top_count = below + 1;
         watch.at(BELOW)?;
+        let ids = ids.get_mut(top_ids as usize..).unwrap_or_default();
+        let plans = self.below(items, ids, nodes, [top_count, top_ids], control, watch)?;
+        Ok(gather(items, nodes, &plans, [top_count, levels]))
+    }
 
-        // Make the nodes over each range.
+    /// Makes the nodes over each range that waits among the first `top_count` nodes; returns how many ranges each task
+    /// had, and where their nodes lie. `ids` follow the first `top_ids`.
+    fn below(
+        &self,
+        items: &mut [TriangleItem],
+        mut ids: &mut [u32],
+        nodes: &mut [Node],
+        [top_count, top_ids]: [u32; 2],
+        control: &Control<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<[TaskRanges; tasks::MOST], Error> {
+        let all = items.len();
         let (top, mut rest) = nodes.split_at_mut((top_count as usize).min(nodes.len()));
-        let mut ids = ids.get_mut(top_ids as usize..).unwrap_or_default();
         let mut plans = [TaskRanges::default(); tasks::MOST];
-        let (mut first, mut start, mut cursor, mut items_left) =
-            (top_ids, 0, Cursor::new(), &mut *items);
+        let (mut first, mut start, mut cursor, mut items_left) = (top_ids, 0, Cursor::new(), items);
         let mut next = |goal: u32| {
             let before = cursor;
             let ranges = Ranges::until(goal, &mut cursor, top);
@@ -358,7 +369,7 @@ impl HighInputs {
             let mut made = 0;
             plans[0].child = top_count;
             for step in 0..STEPS {
-                let (part, ranges) = next(share(all as usize, step, STEPS).end as u32);
+                let (part, ranges) = next(share(all, step, STEPS).end as u32);
                 let nodes = rest.get_mut(made as usize..).unwrap_or_default();
                 plans[0].ranges += ranges.count;
                 made += part.make(nodes, top_count + made);
@@ -368,7 +379,7 @@ impl HighInputs {
             let mut child = top_count;
             let tasks = self.tasks as usize;
             let parts = plans.iter_mut().take(tasks).enumerate().map(|(task, plan)| {
-                let (part, ranges) = next(share(all as usize, task, tasks).end as u32);
+                let (part, ranges) = next(share(all, task, tasks).end as u32);
                 let nodes = take_up_to(&mut rest, ranges.nodes as usize);
                 *plan = TaskRanges { ranges: ranges.count, child };
                 child += ranges.nodes;
@@ -377,31 +388,40 @@ impl HighInputs {
             let make = |(part, nodes, child): (RangesTask<'_>, _, _)| part.make(nodes, child);
             run(control, parts, make, |_| Ok(()))?;
         }
-
-        // Move them together, and the root of each range to where it waits.
-        let mut cursor = Cursor::new();
-        let mut count = top_count;
-        for TaskRanges { ranges, mut child } in plans {
-            for _ in 0..ranges {
-                let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
-                let Some(waiter) = cursor.next(top).or_bug("a range is missing") else { break };
-                let behind = items.get(waiter.start as usize..).unwrap_or_default();
-                let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
-                let Some(record) = record else { break };
-                let RangeRecord { mut root, nodes: below, levels: most, .. } = transmute!(*record);
-                let moved = child - count;
-                move_nodes(nodes, child..child + below, count);
-                root.child -= moved;
-                if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
-                    *slot = root;
-                }
-                child += below;
-                count += below;
-                levels = levels.max(most);
-            }
-        }
-        Ok((count, levels))
+        Ok(plans)
     }
+}
+
+/// Moves the nodes of all tasks together, and the root of each range to where it waits; returns how many nodes and
+/// levels there are. So far they are those of the top.
+fn gather(
+    items: &[TriangleItem],
+    nodes: &mut [Node],
+    plans: &[TaskRanges],
+    [top_count, mut levels]: [u32; 2],
+) -> (u32, u32) {
+    let mut cursor = Cursor::new();
+    let mut count = top_count;
+    for &TaskRanges { ranges, mut child } in plans {
+        for _ in 0..ranges {
+            let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
+            let Some(waiter) = cursor.next(top).or_bug("a range is missing") else { break };
+            let behind = items.get(waiter.start as usize..).unwrap_or_default();
+            let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
+            let Some(record) = record else { break };
+            let RangeRecord { mut root, nodes: below, levels: most, .. } = transmute!(*record);
+            let moved = child - count;
+            move_nodes(nodes, child..child + below, count);
+            root.child -= moved;
+            if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
+                *slot = root;
+            }
+            child += below;
+            count += below;
+            levels = levels.max(most);
+        }
+    }
+    (count, levels)
 }
 
 /// Parts of the work of a single task, after each of which progress is reported.
