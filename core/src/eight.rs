@@ -5,8 +5,9 @@
 //!                                                                    y, z likewise
 //! ```
 //!
-//! The lanes do the same operations in the same order as one triangle alone, none of them fused, so they drop the same
-//! triangles. Triangles that pass, about one a ray, are decided in f64 one by one.
+//! The lanes do the same operations in the same order as one triangle alone, none of them fused,
+//! so they drop the same triangles. Triangles that pass, about one a ray, are decided in f64 one
+//! by one.
 //!
 //! Rows are transposed in registers: a row that is copied through memory, or `map` over arrays of vectors, stores
 //! pieces, and the load of the whole waits for these stores.
@@ -35,18 +36,13 @@ pub(crate) struct Eight<S: Simd> {
 }
 
 impl<S: Simd> Eight<S> {
-    /// The first `count` of eight triangles. Two, four or all are read: reading more than are tested costs cache lines
-    /// in large meshes.
+    /// The first `count` of eight triangles; the others are read, too.
     #[inline(always)]
     pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
         let [i, j, k, l, m, n, o, p] = ids;
         // The part of a joined mesh that holds the triangle before.
         let mut last_part = None;
-        let (low, used) = if count > 2 {
-            four(simd, mesh, [i, j, k, l], &mut last_part)
-        } else {
-            four(simd, mesh, [i, j, i, j], &mut last_part)
-        };
+        let (low, used) = four(simd, mesh, [i, j, k, l], &mut last_part);
         let (high, used_high) = if count > LANES / 2 {
             four(simd, mesh, [m, n, o, p], &mut last_part)
         } else {
