@@ -90,8 +90,7 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         boxes
     }
 
-    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than
-    /// eight.
+    /// The boxes of a leaf relative to a point, grown on each side. Lanes that are not used hold others of its boxes.
     #[inline(always)]
     pub(crate) fn of_leaf(
         simd: S,

@@ -17,7 +17,7 @@ use crate::extremes::Extremes;
 use crate::mesh::{BOX_BYTES, TriangleMesh};
 use crate::ray::INVALID_ID;
 
-/// The least and the greatest corners of the boxes of a leaf. Lanes that are not used have corners of others.
+/// The least and the greatest corners of the boxes of a leaf. Lanes that are not used hold those of others of its boxes.
 #[inline(always)]
 pub(super) fn boxes_of_leaf<S: Simd>(
     simd: S,

@@ -1,4 +1,4 @@
-//! Reads many triangles fast: sixteen bytes a vertex.
+//! Reads many triangles fast, sixteen bytes a vertex, and boxes, 24 bytes each.
 //!
 //! ```text
 //! x y z and the four bytes behind them, whatever they are: one check and one load a vertex, not three
@@ -60,7 +60,8 @@ impl<'a> WideMesh<'a> {
         Some([corners(0)?, corners(1)?, corners(2)?, corners(3)?])
     }
 
-    /// The six numbers of a box. `None` does not mean that there is no such box: some layouts are not read this way.
+    /// The six numbers of a box, for a mesh of boxes. `None` does not mean that there is no such box: one with a large
+    /// stride is not read this way.
     #[inline(always)]
     pub(crate) fn sides(&self, id: u32) -> Option<&'a [u8; BOX_BYTES]> {
         element(self.positions, self.position_stride, id)

@@ -206,11 +206,16 @@ pub(super) struct ObjectRay {
     shift: f64,
 }
 
-/// From 2^29 extents away, f64 rounding moves an origin by 2^-23 extent; [`GROWTH`] covers 2^-19, the rest is a margin.
+/// From 2^29 extents away, roundings in f64 move an origin by less than 2^-21 extent; [`GROWTH`] covers 2^-19, the rest
+/// is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
 
-/// A direction that is smaller on an axis is parallel to the sides of boxes there.
+/// A direction that is smaller on an axis counts as parallel to the sides of boxes there: with one over it, a distance
+/// might become infinite or NaN. A ray from less than 1e50 away moves by less than 1e-50 on such an axis.
 const PARALLEL: f64 = 1e-100;
+
+/// The exponents of a power of two and of one over it, added.
+const EXPONENTS_OF_BOTH: u64 = (2 * 1023) << 52;
 
 impl ObjectRay {
     /// No ray: fills the places of a group.
@@ -225,11 +230,11 @@ impl ObjectRay {
         let longest = greater(x, greater(y, z));
         let exponent = longest.to_bits() & 0x7ff0_0000_0000_0000;
         let scale = f64::from_bits(exponent);
-        // Neither zero nor NaN nor beyond what can be divided by.
+        // Neither zero nor NaN, nor so large or small that one over it is no normal number.
         let is_ray = (1e-300..1e300).contains(&longest);
         is_ray.then(|| {
             // One over the power of two, without a division.
-            let unit = f64::from_bits((2046 << 52) - exponent);
+            let unit = f64::from_bits(EXPONENTS_OF_BOTH - exponent);
             let direction = line.direction.map(|d| d * unit);
             Self { line: LineF64 { direction, ..*line }, scale, shift: 0.0 }
         })
