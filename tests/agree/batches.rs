@@ -430,10 +430,10 @@ fn rays_in_any_order_agree_with_any_scratch() {
                         for (i, expected) in expected.iter().enumerate() {
                             let is_right = bits(&hits[i]) == bits(expected)
                                 && occluded[i] == u8::from(*expected != Hit::MISS);
-                            let ray = rays[i];
+                            let (ray, hit, blocked) = (rays[i], hits[i], occluded[i]);
                             assert!(
                                 is_right,
-                                "{level:?} {bytes} {from}: ray {i} {ray:?} {expected:?}"
+                                "{level:?} {bytes} {from}: ray {i} {ray:?}: {hit:?} and {blocked}, not {expected:?}"
                             );
                         }
                         let (before, rest) = memory.split_at(from);

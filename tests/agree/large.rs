@@ -107,7 +107,10 @@ fn interleaved_rays_agree_with_each_alone() {
             let found = batch(&grid.with_simd(level), &rays, coherence, &mut options);
             for ((ray, found), expected) in rays.iter().zip(&found).zip(&expected) {
                 let is_right = bits(found) == bits(expected);
-                assert!(is_right, "{level:?} {coherence:?} {mask} {cull:?} {ray:?} {expected:?}");
+                assert!(
+                    is_right,
+                    "{level:?} {coherence:?} {mask} {cull:?} {ray:?}: {found:?}, not {expected:?}"
+                );
             }
         }
     }

@@ -8,6 +8,7 @@ use hgrid_core::{
 };
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::Built;
+use zerocopy::IntoBytes;
 
 use super::batches::{COHERENCES, odd_rays};
 
@@ -101,6 +102,68 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
                 let is_hit = shapes.occluded_with(&ray, &mut options, &mut test);
                 assert_eq!(is_hit, expected.is_some(), "{ray:?}");
             }
+        }
+    }
+}
+
+/// Boxes that lie more than 65535 bytes apart are read in another way. Nothing follows the last box.
+#[test]
+fn boxes_at_any_stride_give_the_same_answers() {
+    let qualities = Quality::ALL.iter().copied();
+    for (count, quality) in (1..=9).flat_map(|count| qualities.clone().map(move |q| (count, q))) {
+        let all = spheres(count, 0.5, count as u64);
+        let mut random = Random(7);
+        let rays: Vec<_> = (0..256).map(|round| ray(&mut random, round)).collect();
+        let expected: Vec<_> = rays
+            .iter()
+            .map(|ray| {
+                let hits = all.iter().zip(0_u32..);
+                let hits = hits.filter_map(|(sphere, id)| Some((meet(*sphere, ray)?, id)));
+                let nearest = hits.reduce(|a, b| if b.0.t < a.0.t { b } else { a });
+                nearest.map_or(Hit::MISS, |(ShapeHit { t, u, v }, primitive)| Hit {
+                    t,
+                    u,
+                    v,
+                    primitive,
+                })
+            })
+            .collect();
+        let blocked: Vec<_> = expected.iter().map(|hit| u8::from(hit.t.is_finite())).collect();
+        assert!(blocked.contains(&1) && blocked.contains(&0), "{count}");
+        let mut first_asked = None;
+        for stride in [24, 28, 65_535, 65_541] {
+            let mut bytes = vec![0xff; (count - 1) * stride + 24];
+            for (sphere, place) in all.iter().zip(bytes.chunks_mut(stride)) {
+                place[..24].copy_from_slice(box_of(*sphere).as_bytes());
+            }
+            let boxes = Boxes::strided(Strided { bytes: &bytes, stride, count }).unwrap();
+            let built = Built::shapes(boxes, &Parameters::Bvh { quality }.into()).unwrap();
+            let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+            // The shapes that are asked, in their order, show what boxes were read.
+            let mut asked = Vec::new();
+            let mut test = |id: u32, part: &Ray| {
+                asked.push(id);
+                meet(all[id as usize], part)
+            };
+            for ((ray, expected), blocked) in rays.iter().zip(&expected).zip(&blocked) {
+                let hit = shapes.intersect(ray, &mut test).unwrap_or(Hit::MISS);
+                assert_eq!(hit, *expected, "{count} at {stride}: {ray:?}");
+                let is_hit = shapes.occluded(ray, &mut test);
+                assert_eq!(u8::from(is_hit), *blocked, "{count} at {stride}: {ray:?}");
+            }
+            for coherence in COHERENCES {
+                let (given, mut hits) = (Strided::new(&rays), vec![Hit::MISS; rays.len()]);
+                let options = &mut QueryOptions::default();
+                let answers = &mut StridedMut::new(&mut hits);
+                shapes.intersect_n(&given, answers, coherence, options, &mut test).unwrap();
+                assert_eq!(hits, expected, "{count} at {stride}");
+                let mut occluded = vec![7_u8; rays.len()];
+                let answers = &mut StridedMut::new(&mut occluded);
+                shapes.occluded_n(&given, answers, coherence, options, &mut test).unwrap();
+                assert_eq!(occluded, blocked, "{count} at {stride}");
+            }
+            let first = first_asked.get_or_insert_with(|| asked.clone());
+            assert!(asked == *first, "{count} at {stride}: other shapes are asked");
         }
     }
 }

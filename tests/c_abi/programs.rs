@@ -49,7 +49,8 @@ const PROGRAMS: [(&str, Flavour); 23] = [
 pub(crate) const SANITIZERS: [&str; 4] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O0"];
 
-/// The argument that makes a program do a part of its work, if it can. The test with sanitizers runs all of it.
+/// The argument that makes a program do a part of its work, if it can. The test with sanitizers runs all of it, except
+/// for `stack`, which has a slow test for all.
 const PART: &str = "part";
 
 /// Compiles a program of this folder against a library.
@@ -71,7 +72,7 @@ pub(crate) fn compile(
     program
 }
 
-/// Returns the programs, compiled once without sanitizers, for valgrind.
+/// Returns the programs, compiled once without sanitizers.
 fn plain() -> impl Iterator<Item = (PathBuf, Flavour)> {
     static DIR: OnceLock<PathBuf> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
@@ -240,6 +241,13 @@ fn they_pass_under_valgrind() {
     let programs = plain().map(|(program, _)| program);
     // Another tool checks the program with threads.
     run_in_valgrind(&programs.filter(|path| !path.ends_with("threads")).collect::<Vec<_>>(), &[]);
+}
+
+/// Optimised code without sanitizers lays out its memory as that of users, and nothing slows its threads down.
+#[test]
+#[ignore = "slow: compiles all programs"]
+fn they_pass_as_they_are() {
+    run_side_by_side(plain().map(|(program, _)| Command::new(program)).collect());
 }
 
 /// Runs the programs with concurrent queries and parallel builds.

@@ -520,7 +520,8 @@ int main(int argc, char **argv)
         for (int method = 0; method <= METHODS; method++) {
             if (crowds == TANGLED && method < METHODS - 1)
                 continue;
-            /* Grids over crowds need no more stack and take half a minute: a part has one tree of each mesh. */
+            /* Grids over crowds need no more stack and take half a minute. Apart from all methods over the sheet
+             * alone, a part has a tree over all crowds and one of high quality over the tangle. */
             if (is_part && crowds > 0 && (crowds < CROWDS || method != METHODS - (crowds == CROWDS)))
                 continue;
             is_tangled = crowds == TANGLED;

@@ -10,16 +10,16 @@ use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::pictures::ascii;
-use crate::programs::{drawing, link, printed, raytracer};
+use crate::programs::{drawing, kept, link, printed, raytracer};
 
 /// Builds the program once, if there is an MPI.
 fn mpi() -> Option<&'static Path> {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     is_installed("mpi").then(|| {
         &**PROGRAM.get_or_init(|| {
-            let program = TempDir::new().expect("a folder").keep().join("mpi");
-            link(warnings(command("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], &program);
-            program
+            kept("mpi", |program| {
+                link(warnings(command("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], program);
+            })
         })
     })
 }

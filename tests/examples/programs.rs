@@ -1,5 +1,6 @@
 //! The examples, compiled as their Makefile does.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -47,32 +48,43 @@ pub(crate) fn drawing(more: &[&str]) -> Vec<PathBuf> {
     DRAWING.iter().chain(more).map(|name| example(name)).collect()
 }
 
-/// Returns the ray tracer, compiled once into a folder that stays until the test program ends.
+/// Makes a program in cargo's folder for files of tests, in place of that of an earlier run, and returns its path. Each
+/// process makes its own, which never lies there in part: another may run the one before meanwhile.
+pub(crate) fn kept(path: &str, make: impl FnOnce(&Path)) -> PathBuf {
+    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join("examples").join(path);
+    let parent = program.parent().expect("a folder");
+    fs::create_dir_all(parent).expect("a folder");
+    let dir = TempDir::new_in(parent).expect("a folder");
+    let new = dir.path().join("program");
+    make(&new);
+    fs::rename(new, &program).expect("a program");
+    program
+}
+
+/// Returns the ray tracer, compiled once for all tests of this process.
 pub(crate) fn raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    Command::new(PROGRAM.get_or_init(|| raytracer_with(&[])))
+    Command::new(PROGRAM.get_or_init(|| raytracer_with("plain", &[])))
 }
 
 /// Returns the ray tracer with sanitizers, for files that are not trusted.
 pub(crate) fn watched_raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    Command::new(PROGRAM.get_or_init(|| raytracer_with(&WATCHED)))
+    Command::new(PROGRAM.get_or_init(|| raytracer_with("watched", &WATCHED)))
 }
 
-/// Compiles a ray tracer with flags of its own.
-pub(crate) fn raytracer_with(flags: &[&str]) -> PathBuf {
-    let program = TempDir::new().expect("a folder").keep().join("raytracer");
-    compile(&drawing(&["raytracer.c", "heat.c"]), flags, &program);
-    program
+/// Compiles a ray tracer with flags of its own into a folder of this name.
+pub(crate) fn raytracer_with(folder: &str, flags: &[&str]) -> PathBuf {
+    kept(&format!("{folder}/raytracer"), |program| {
+        compile(&drawing(&["raytracer.c", "heat.c"]), flags, program);
+    })
 }
 
 /// Returns the program of two processes, with sanitizers.
 pub(crate) fn watched_mapped() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     Command::new(PROGRAM.get_or_init(|| {
-        let program = TempDir::new().expect("a folder").keep().join("mapped");
-        compile(&drawing(&["mapped.c"]), &WATCHED, &program);
-        program
+        kept("watched/mapped", |program| compile(&drawing(&["mapped.c"]), &WATCHED, program))
     }))
 }
 

@@ -45,7 +45,7 @@ fn its_threads_do_not_race() {
     let dir = TempDir::new().expect("a folder");
     let scene = dir.path().join("house.ply");
     fs::write(&scene, ascii()).expect("a file");
-    let program = raytracer_with(&["-g", "-fsanitize=thread"]);
+    let program = raytracer_with("threads", &["-g", "-fsanitize=thread"]);
     let mut raytracer = Command::new(program);
     raytracer.arg(&scene).args(["--size", "90", "--shadows", "--ao", "2", "--threads", "4"]);
     raytracer.args(["--method", "bvh", "--progress", "-o"]).arg(dir.path().join("picture.ppm"));

@@ -259,7 +259,7 @@ fn tasks_do_not_show() {
 
 #[test]
 #[ignore = "slow: a hundred builds of a hundred thousand triangles"]
-fn tasks_show_in_no_mesh() {
+fn tasks_do_not_show_in_other_meshes() {
     do_tasks_show(&[0, 1, 4, 5]);
 }
 
@@ -275,7 +275,7 @@ fn do_tasks_show(which: &[usize]) {
         [soup(COUNT, 0.01, 1), behind, mixed, crowds(COUNT), one_centre(COUNT), nested(COUNT, 4)];
     let qualities = Quality::ALL.iter().map(|&quality| config(quality));
     let all = meshes.iter().enumerate().filter(|(number, _)| which.contains(number));
-    for ((which, mesh), config) in all.flat_map(|mesh| qualities.clone().map(move |of| (mesh, of)))
+    for ((number, mesh), config) in all.flat_map(|mesh| qualities.clone().map(move |of| (mesh, of)))
     {
         assert_eq!(mesh.indices.len(), COUNT);
         let view = mesh.view();
@@ -297,7 +297,7 @@ fn do_tasks_show(which: &[usize]) {
                     let grid = Grid::build_with(view, &config, index, scratch, &control);
                     grid.unwrap().blob() == expected.bytes()
                 };
-                assert!(same, "mesh {which}, {tasks} tasks, memory for {memory}");
+                assert!(same, "mesh {number}, {tasks} tasks, memory for {memory}");
                 assert!(index.around_is_intact() && scratch.around_is_intact());
             }
         }
@@ -307,6 +307,6 @@ fn do_tasks_show(which: &[usize]) {
         let mut scratch = Guarded::new(bound(7).scratch_bytes);
         let grid =
             Grid::build_with(view, &config, index.region(), scratch.region(), &control).unwrap();
-        assert!(grid.blob() == expected.bytes(), "mesh {which}");
+        assert!(grid.blob() == expected.bytes(), "mesh {number}");
     }
 }

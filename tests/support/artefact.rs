@@ -131,7 +131,8 @@ pub fn library_with(features: &str) -> PathBuf {
     build_beside(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
 }
 
-/// Does the same with less optimisation, which takes less time.
+/// Builds the library with some of its methods, as [`library_with`] does, but with less optimisation, which takes less
+/// time. Returns the path of the static library.
 #[must_use]
 pub fn plain_library_with(features: &str) -> PathBuf {
     let plain = ["hgrid-core", "hgrid-capi"]
