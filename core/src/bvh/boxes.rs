@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
-//! center of the group. A distance is `side * inverse - origin * inverse`; the second product is computed once a ray.
+//! centre of the group. A distance is `side * inverse - origin * inverse`; the second product is computed once a ray.
 //!
 //! ```text
 //! relative to the distance   near: node's origin 1, sum 1, growth 1, product 1, sum 1, inverse 1    6 u
@@ -90,7 +90,7 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         boxes
     }
 
-    /// The boxes of a leaf relative to a point, grown on each side. Lanes that are not used hold others of its boxes.
+    /// The boxes of a leaf relative to a point, grown on each side. Unused lanes repeat other boxes of the leaf.
     #[inline(always)]
     pub(crate) fn of_leaf(
         simd: S,

@@ -235,7 +235,7 @@ pub(super) struct Met {
 impl Met {
     pub(super) const NONE: Self = Self { slots: 0, rays: [0; WIDTH], near: [0.0; WIDTH] };
 
-    /// Intersects some rays of a group with the boxes that are used; finds the entry distances only if they matter.
+    /// Intersects some rays of a group with the boxes that are used; finds entry distances only if they are wanted.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "each is its own")]
     pub(super) fn meet<S: Simd>(

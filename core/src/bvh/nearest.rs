@@ -232,7 +232,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
                     if let &[id] = ids {
-                        // The bounds of a leaf cost as much as the test of one triangle.
+                        // Bounding a leaf costs as much as testing one triangle.
                         reach = point.reach(test(id));
                     } else {
                         let lanes = bvh.lanes(first, ids);

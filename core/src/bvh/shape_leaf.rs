@@ -17,7 +17,7 @@ use crate::extremes::Extremes;
 use crate::mesh::{BOX_BYTES, TriangleMesh};
 use crate::ray::INVALID_ID;
 
-/// The least and the greatest corners of the boxes of a leaf. Lanes that are not used hold those of others of its boxes.
+/// The least and the greatest corners of the boxes of a leaf. Unused lanes repeat other boxes.
 #[inline(always)]
 pub(super) fn boxes_of_leaf<S: Simd>(
     simd: S,
@@ -25,7 +25,7 @@ pub(super) fn boxes_of_leaf<S: Simd>(
     ids: &[u32],
 ) -> ([f32x8<S>; 3], [f32x8<S>; 3]) {
     let first = four(simd, mesh, ids);
-    // Most leaves have few shapes: read no others.
+    // Most leaves have four shapes or fewer: read no more.
     let ([a, b, c], [d, e, f]) = match ids.get(WIDTH / 2..) {
         Some(rest) if !rest.is_empty() => {
             let last = four(simd, mesh, rest);
