@@ -130,6 +130,20 @@ fn crowds_leave_alone_what_is_behind_the_blob() {
     assert_eq!(index.region()[used..], before[used..]);
 }
 
+#[test]
+fn crowds_are_divided_without_a_second_copy() {
+    let mesh = nested(20_000, 2);
+    let config = config(Quality::Fast);
+    let bound = Sizes::bound(20_000, &config).unwrap();
+    let [mut index, mut scratch] = [bound.index_bytes, bound.scratch_bytes].map(Guarded::new);
+    let before = scratch.region().to_vec();
+    Grid::build(mesh.view(), &config, index.region(), scratch.region()).unwrap();
+    let touched = scratch.region().iter().zip(&before).rposition(|(now, then)| now != then);
+    // Counts, entries, and two thirds of a number for each triangle; the second copy would begin behind 8.5.
+    let touched = touched.unwrap();
+    assert!(touched < 20_000 * 12, "{touched} of {} bytes", bound.scratch_bytes);
+}
+
 /// Builds in the memory of the bound, and returns the numbers of nodes and levels.
 fn builds_in_its_bound(mesh: &Mesh, quality: Quality) -> [u32; 2] {
     let (view, config) = (mesh.view(), config(quality));

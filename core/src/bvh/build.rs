@@ -15,8 +15,8 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! `spare` is the second buffer when a bin is sorted. For a crowded bin it holds the centres first, and is then the
-//! second buffer when the bin is divided. `sizes` computes the exact size by a build without an index: it also puts
+//! `spare` is the second buffer when a bin is sorted. It holds the centres of a crowded bin, as far as those have no room
+//! in the index. `sizes` computes the exact size by a build without an index: it also puts
 //! the keys and the top tree into `spare`, and only counts ids and nodes. A build puts the keys there, too, if they
 //! do not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!

@@ -3,9 +3,13 @@
 //! ```text
 //! centers     read each triangle once: store min + max of its box, find the box around all centres
 //! new keys    for eight triangles: keys of their centres in that box; count the bin of each
+//! permute     for each place: while its entry belongs elsewhere, swap it to the last free place of its bin
 //!
-//! min + max (twice the centre) is stored in | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
+//! min + max (twice the centre) is stored: z in the entry, x and y in two arrays
 //! ```
+//!
+//! Entries move in place, so a crowded unit needs no second copy of itself. Their order in a bin becomes an arbitrary
+//! one, but the same for any number of tasks: it depends on the unit alone.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
@@ -21,32 +25,37 @@ use super::key::Keys;
 use super::layout::Entry;
 use super::subtree::slow_bounds;
 
+/// Entries of a crowded unit, and room for two numbers for each of them.
+#[derive(Debug)]
+pub(crate) struct CrowdPart<'w> {
+    pub(crate) entries: &'w mut [Entry],
+    pub(crate) xs: &'w mut [u32],
+    pub(crate) ys: &'w mut [u32],
+}
+
 /// Finds the box around the centres of the triangles' boxes. Stores min + max of each box (twice the centre): x and
-/// y in `spare`, z in place of the key. Out of line: few units are crowded, and inlined it would slow down all others.
+/// y in the room for them, z in place of the key. Out of line: few units are crowded, and inlined it would slow down
+/// all others.
 #[inline(never)]
-pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mut [Entry]) -> Aabb {
-    debug_assert!(spare.len() >= entries.len(), "too little room for the centres of a unit");
+pub(crate) fn centers(mesh: &TriangleMesh<'_>, part: CrowdPart<'_>) -> Aabb {
+    let CrowdPart { entries, xs, ys } = part;
+    debug_assert!(xs.len() >= entries.len() && ys.len() >= entries.len(), "no room for centres");
     let wide = mesh.wide();
     let mut centers = Aabb::EMPTY;
-    for (entries, room) in entries.chunks_mut(LANES).zip(spare.chunks_mut(LANES)) {
-        let (xs, ys) =
-            room.as_flattened_mut().split_at_mut_checked(entries.len()).unwrap_or_default();
-        for ((entry, x), y) in entries.iter_mut().zip(xs).zip(ys) {
-            let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
-            let twice = min + max;
-            [*x, *y, entry[0]] = twice.to_array().map(f32::to_bits);
-            let center = twice * 0.5;
-            centers.min = centers.min.min(center);
-            centers.max = centers.max.max(center);
-        }
+    for ((entry, x), y) in entries.iter_mut().zip(xs).zip(ys) {
+        let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
+        let twice = min + max;
+        [*x, *y, entry[0]] = twice.to_array().map(f32::to_bits);
+        let center = twice * 0.5;
+        centers.min = centers.min.min(center);
+        centers.max = centers.max.max(center);
     }
     centers
 }
 
 /// Gives entries new keys, from the sums that [`centers`] stored, and counts those of each bin.
 pub(crate) struct NewKeys<'w> {
-    pub(crate) entries: &'w mut [Entry],
-    pub(crate) spare: &'w [Entry],
+    pub(crate) part: CrowdPart<'w>,
     pub(crate) rule: &'w Keys,
     /// Number of low key bits that do not choose a bin.
     pub(crate) shift: u32,
@@ -58,11 +67,10 @@ impl Kernel for NewKeys<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { entries, spare, rule, shift, counts } = self;
-        debug_assert!(spare.len() >= entries.len(), "entries without centres");
-        for (entries, stored) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
-            let (xs, ys) =
-                stored.as_flattened().split_at_checked(entries.len()).unwrap_or_default();
+        let Self { part: CrowdPart { entries, xs, ys }, rule, shift, counts } = self;
+        debug_assert!(xs.len() >= entries.len() && ys.len() >= entries.len(), "no centres");
+        let stored = xs.chunks(LANES).zip(ys.chunks(LANES));
+        for (entries, (xs, ys)) in entries.chunks_mut(LANES).zip(stored) {
             match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {
                 (Some(&[a, b, c, d, e, f, g, h]), Some(xs), Some(ys)) if HAS_VECTORS => {
                     let zs = [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]];
@@ -98,6 +106,30 @@ fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
     }
 }
 
+/// Moves entries into their bins, in place. `ends` has where the entries of each bin end, and afterwards where they
+/// start.
+pub(crate) fn permute(entries: &mut [Entry], ends: &mut [u32], shift: u32) {
+    for at in 0..entries.len() {
+        let Some(&(mut entry)) = entries.get(at) else { break };
+        // An entry goes to the last free place of its bin. What stands there comes next, until one belongs here.
+        while let Some(end) =
+            ends.get_mut((entry[0] >> shift) as usize).or_bug("a key without a bin")
+            && at < *end as usize
+        {
+            *end -= 1;
+            if at == *end as usize {
+                break;
+            }
+            if let Some(slot) = entries.get_mut(*end as usize).or_bug("a bin behind the entries") {
+                core::mem::swap(slot, &mut entry);
+            }
+        }
+        if let Some(slot) = entries.get_mut(at) {
+            *slot = entry;
+        }
+    }
+}
+
 /// The box of a triangle, which is known to be finite.
 #[inline(always)]
 fn bounds(mesh: &TriangleMesh<'_>, wide: &WideMesh<'_>, id: u32) -> Aabb {
@@ -119,8 +151,9 @@ mod tests {
     fn check(mesh: &TriangleMesh<'_>, ids: &[u32]) {
         let shift = 24;
         let entries: Vec<Entry> = ids.iter().map(|&id| [7, id]).collect();
-        let (mut noted, mut spare) = (entries.clone(), entries.clone());
-        let rule = Keys::new(&centers(mesh, &mut noted, &mut spare));
+        let (mut noted, mut xs, mut ys) = (entries.clone(), ids.to_vec(), ids.to_vec());
+        let part = CrowdPart { entries: &mut noted, xs: &mut xs, ys: &mut ys };
+        let rule = Keys::new(&centers(mesh, part));
         let (mut expected, mut expected_counts) = (entries.clone(), [0; 64]);
         for [key, id] in &mut expected {
             *key = rule.of(&Aabb::of(mesh.corners(*id).unwrap()).unwrap());
@@ -128,9 +161,8 @@ mod tests {
         }
         for level in SimdLevel::available() {
             let (mut entries, mut counts) = (noted.clone(), [0; 64]);
-            let (all, counts_of) = (&mut *entries, &mut counts[..]);
-            let keys =
-                NewKeys { entries: all, spare: &spare, rule: &rule, shift, counts: counts_of };
+            let part = CrowdPart { entries: &mut entries, xs: &mut xs, ys: &mut ys };
+            let keys = NewKeys { part, rule: &rule, shift, counts: &mut counts };
             dispatch(level, keys);
             assert_eq!((entries, counts), (expected.clone(), expected_counts), "{level:?}");
         }
@@ -151,6 +183,27 @@ mod tests {
             check(&mesh, &ids);
             let ids: Vec<u32> = (0..count).map(|i| i * 11 % 60).collect();
             check(&joined, &ids);
+        }
+    }
+
+    #[test]
+    fn entries_are_moved_into_their_bins() {
+        let mut state = 1;
+        for count in [0, 1, 2, 3, 50, 1000] {
+            let entries: Vec<Entry> =
+                (0..count).map(|id| [random::next(&mut state) >> 27, id]).collect();
+            let mut ends = [0; 16];
+            for [key, _] in &entries {
+                ends[(key >> 1) as usize..].iter_mut().for_each(|end| *end += 1);
+            }
+            let expected_ends = ends;
+            let mut moved = entries.clone();
+            permute(&mut moved, &mut ends, 1);
+            assert!(moved.is_sorted_by_key(|[key, _]| key >> 1));
+            let starts = [&[0][..], &expected_ends[..15]].concat();
+            assert_eq!(ends[..], starts);
+            moved.sort_unstable_by_key(|[_, id]| *id);
+            assert_eq!(moved, entries);
         }
     }
 }

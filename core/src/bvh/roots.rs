@@ -7,13 +7,13 @@
 //!     else:    sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
-//! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
+//! spare   | second buffer of the sort | untouched |
 //! ```
 //!
-//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of
-//! several crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over
-//! entries that were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192
-//! bytes.
+//! A crowded unit is binned in place. Two of the three numbers of each centre are stored in places that the build writes
+//! later in any case: of the ids of the unit, and of as many nodes as any tree over the triangles has. What has no room
+//! there is stored in `spare`. The record of a root is 112 bytes, written over entries that were used up:
+//! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -22,17 +22,18 @@ use core::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
-use crate::arena::copy;
+use crate::arena::whole;
 use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
+use crate::tasks::take;
 
-use super::crowd::{self, NewKeys};
+use super::crowd::{self, CrowdPart, NewKeys, permute};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, TRIANGLES_PER_ROOT, bin_bits,
 };
-use super::node::Node;
+use super::node::{LEAF, Node, WIDTH};
 use super::sort::sort;
 use super::subtree::{Build, Cut, Subtree};
 use super::units::{RootBudget, starts};
@@ -104,20 +105,24 @@ impl Roots<'_> {
     /// only in their lowest `shift` bits.
     pub(crate) fn unit(&mut self, range: Range<usize>, shift: u32, depth: u32) {
         debug_assert!(range.end <= self.entries.len(), "a unit behind the entries");
-        let Some(entries) = self.entries.get_mut(range.clone()) else { return };
-        if entries.len() > MOST_UNIT {
+        if range.len() > MOST_UNIT {
             if depth < DIVISIONS {
-                let centers = crowd::centers(self.mesh, entries, self.spare);
+                let mesh = self.mesh;
+                let ([one, other], _) = self.crowd(&range);
+                let centers = crowd::centers(mesh, one).union(&crowd::centers(mesh, other));
                 if centers.size().max_element() > 0.0 {
                     self.divide(range, &centers, depth);
                     return;
                 }
                 // Equal centres keep the order of their ids.
-                for entry in entries {
+                for entry in self.entries.get_mut(range.clone()).into_iter().flatten() {
                     entry[0] = 0;
                 }
             }
-        } else if let Some(spare) = self.spare.get_mut(..entries.len()).or_bug("no room to sort") {
+        } else {
+            let entries = self.entries.get_mut(range.clone());
+            let spare = self.spare.get_mut(..range.len()).or_bug("no room to sort");
+            let (Some(entries), Some(spare)) = (entries, spare) else { return };
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
             sort(entries, spare, (32 - differing.leading_zeros()).max(shift));
@@ -214,31 +219,51 @@ impl Roots<'_> {
         let shift = KEY_BITS - bits;
 
         // Find new keys, and count those of each bin.
-        let entries = self.entries.get_mut(range).or_bug("a unit behind the entries");
-        let counts = self.counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
-        let (Some(entries), Some(counts)) = (entries, counts) else { return };
+        let level = self.level;
+        let (parts, counts) = self.crowd(&range);
+        let counts = counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
+        let Some(counts) = counts else { return };
         counts.fill(0);
-        dispatch(self.level, NewKeys { entries, spare: self.spare, rule, shift, counts });
+        for part in parts {
+            dispatch(level, NewKeys { part, rule, shift, counts: &mut *counts });
+        }
 
-        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that
-        // order.
+        // Move the entries to their bins, crowded bins first.
+        let entries = self.entries.get_mut(range);
+        let (Some(entries), Some(counts)) = (entries, self.counts.get_mut(..1 << bits)) else {
+            return;
+        };
         let mut next = starts(counts);
         for count in &mut *counts {
             let next = &mut next[usize::from(*count as usize <= CROWD)];
-            *next += core::mem::replace(count, *next);
+            *next += *count;
+            *count = *next;
         }
-        let binned = self.spare.get_mut(..entries.len()).or_bug("no room to bin");
-        let Some(binned) = binned else { return };
-        for entry in &*entries {
-            let head = counts.get_mut((entry[0] >> shift) as usize);
-            if let Some(head) = head.or_bug("a key behind those of all bins") {
-                if let Some(slot) = binned.get_mut(*head as usize).or_bug("a bin is too small") {
-                    *slot = *entry;
-                }
-                *head += 1;
-            }
-        }
-        copy(binned, entries);
+        permute(entries, counts, shift);
+    }
+
+    /// Returns the entries of a crowded unit in two parts, with room for two numbers for each, and the counts of all
+    /// bins. The room of the first part lies in the index.
+    #[inline(never)]
+    fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 2], &mut [u32]) {
+        // Every 64 triangles need a node at least. The root of the tree lies before these.
+        let nodes = (self.entries.len() / (WIDTH * LEAF)).saturating_sub(1);
+        let nodes = self.nodes.get_mut(self.node_count as usize..nodes).unwrap_or_default();
+        let ys = whole::<u32>(nodes.as_mut_bytes());
+        let mut spare = self.spare.as_flattened_mut();
+        let entries = self.entries.get_mut(range.clone()).or_bug("a unit behind the entries");
+        let entries = entries.unwrap_or_default();
+        let xs = match self.ids.get_mut(range.clone()) {
+            Some(ids) => ids,
+            // Without an index, or in one that is too small, there is no room for ids.
+            None => take(&mut spare, entries.len()),
+        };
+        let middle = ys.len().min(entries.len());
+        debug_assert!(middle + spare.len() >= entries.len(), "no room for the centres of a unit");
+        let (entries, other_entries) = entries.split_at_mut_checked(middle).unwrap_or_default();
+        let (xs, other_xs) = xs.split_at_mut_checked(middle).unwrap_or_default();
+        let one = CrowdPart { entries, xs, ys };
+        ([one, CrowdPart { entries: other_entries, xs: other_xs, ys: spare }], self.counts)
     }
 
     /// Finds the end of the bin at the start of a range.
