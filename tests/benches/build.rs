@@ -32,7 +32,7 @@ fn build(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("exact sizes", triangles), |bencher| {
             bencher.iter(|| sizes(black_box(&mesh), &config, Block::bytes_mut(&mut scratch)));
         });
-        group.bench_function(BenchmarkId::new("one-level", triangles), |bencher| {
+        group.bench_function(BenchmarkId::new("build", triangles), |bencher| {
             bencher.iter(|| {
                 let (index, scratch) =
                     (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
