@@ -3,13 +3,10 @@
 //! ```text
 //! centers     read each triangle once: store min + max of its box, find the box around all centres
 //! new keys    for eight triangles: keys of their centres in that box; count the bin of each
-//! permute     for each place: while its entry belongs elsewhere, swap it to the last free place of its bin
+//! sort        move the entries to where the numbers of centres were, bin after bin, and back
 //!
 //! min + max (twice the centre) is stored: z in the entry, x and y in two arrays
 //! ```
-//!
-//! Entries move in place, so a crowded unit needs no second copy of itself. Their order in a bin becomes an arbitrary
-//! one, but the same for any number of tasks: it depends on the unit alone.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
@@ -106,26 +103,29 @@ fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
     }
 }
 
-/// Moves entries into their bins, in place. `ends` has where the entries of each bin end, and afterwards where they
-/// start.
-pub(crate) fn permute(entries: &mut [Entry], ends: &mut [u32], shift: u32) {
-    for at in 0..entries.len() {
-        let Some(&(mut entry)) = entries.get(at) else { break };
-        // An entry goes to the last free place of its bin. What stands there comes next, until one belongs here.
-        while let Some(end) =
-            ends.get_mut((entry[0] >> shift) as usize).or_bug("a key without a bin")
-            && at < *end as usize
-        {
-            *end -= 1;
-            if at == *end as usize {
-                break;
+/// Sorts the entries of a crowded unit by their bins; in a bin they keep their order. `heads` has where each bin starts.
+/// Each entry moves to its place in the room of the centres, and back from there.
+pub(crate) fn sort_by_bin(mut parts: [CrowdPart<'_>; 2], heads: &mut [u32], shift: u32) {
+    let middle = parts[0].entries.len();
+    for from in [0, 1] {
+        for at in 0..parts[from].entries.len() {
+            let Some(&[key, id]) = parts[from].entries.get(at) else { break };
+            let head = heads.get_mut((key >> shift) as usize).or_bug("a key without a bin");
+            let Some(head) = head else { continue };
+            // Chosen by number, not by a branch, which would often be mispredicted.
+            let part = usize::from(*head as usize >= middle);
+            let place = *head as usize - middle * part;
+            let CrowdPart { xs, ys, .. } = &mut parts[part];
+            let slots = xs.get_mut(place).zip(ys.get_mut(place)).or_bug("a bin is too small");
+            if let Some((x, y)) = slots {
+                (*x, *y) = (key, id);
             }
-            if let Some(slot) = entries.get_mut(*end as usize).or_bug("a bin behind the entries") {
-                core::mem::swap(slot, &mut entry);
-            }
+            *head += 1;
         }
-        if let Some(slot) = entries.get_mut(at) {
-            *slot = entry;
+    }
+    for CrowdPart { entries, xs, ys } in parts {
+        for ((entry, x), y) in entries.iter_mut().zip(&*xs).zip(&*ys) {
+            *entry = [*x, *y];
         }
     }
 }
@@ -187,23 +187,26 @@ mod tests {
     }
 
     #[test]
-    fn entries_are_moved_into_their_bins() {
+    fn entries_are_sorted_by_their_bins() {
         let mut state = 1;
         for count in [0, 1, 2, 3, 50, 1000] {
-            let entries: Vec<Entry> =
+            let mut entries: Vec<Entry> =
                 (0..count).map(|id| [random::next(&mut state) >> 27, id]).collect();
-            let mut ends = [0; 16];
+            let mut heads = [0; 16];
             for [key, _] in &entries {
-                ends[(key >> 1) as usize..].iter_mut().for_each(|end| *end += 1);
+                heads.iter_mut().skip((key >> 1) as usize + 1).for_each(|head| *head += 1);
             }
-            let expected_ends = ends;
-            let mut moved = entries.clone();
-            permute(&mut moved, &mut ends, 1);
-            assert!(moved.is_sorted_by_key(|[key, _]| key >> 1));
-            let starts = [&[0][..], &expected_ends[..15]].concat();
-            assert_eq!(ends[..], starts);
-            moved.sort_unstable_by_key(|[_, id]| *id);
-            assert_eq!(moved, entries);
+            let mut expected = entries.clone();
+            expected.sort_by_key(|[key, _]| key >> 1);
+            let (mut xs, mut ys) = (alloc::vec![0; entries.len()], alloc::vec![0; entries.len()]);
+            let middle = entries.len() / 3;
+            let (one, other) = entries.split_at_mut(middle);
+            let [(one_xs, other_xs), (one_ys, other_ys)] =
+                [xs.split_at_mut(middle), ys.split_at_mut(middle)];
+            let one = CrowdPart { entries: one, xs: one_xs, ys: one_ys };
+            let other = CrowdPart { entries: other, xs: other_xs, ys: other_ys };
+            sort_by_bin([one, other], &mut heads, 1);
+            assert_eq!(entries, expected);
         }
     }
 }

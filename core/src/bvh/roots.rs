@@ -10,9 +10,9 @@
 //! spare   | second buffer of the sort | untouched |
 //! ```
 //!
-//! A crowded unit is binned in place. Two of the three numbers of each centre are stored in places that the build writes
-//! later in any case: of the ids of the unit, and of as many nodes as any tree over the triangles has. What has no room
-//! there is stored in `spare`. The record of a root is 112 bytes, written over entries that were used up:
+//! Two of the three numbers of each centre of a crowded unit are stored in places that the build writes later in any
+//! case: of the ids of the unit, and of as many nodes as any tree over the triangles has. What has no room there is
+//! stored in `spare`. All that is free again when the unit is binned, so it is the second buffer then. The record of a root is 112 bytes, written over entries that were used up:
 //! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
@@ -28,7 +28,7 @@ use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
 use crate::tasks::take;
 
-use super::crowd::{self, CrowdPart, NewKeys, permute};
+use super::crowd::{self, CrowdPart, NewKeys, sort_by_bin};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, TRIANGLES_PER_ROOT, bin_bits,
@@ -228,18 +228,15 @@ impl Roots<'_> {
             dispatch(level, NewKeys { part, rule, shift, counts: &mut *counts });
         }
 
-        // Move the entries to their bins, crowded bins first.
-        let entries = self.entries.get_mut(range);
-        let (Some(entries), Some(counts)) = (entries, self.counts.get_mut(..1 << bits)) else {
-            return;
-        };
+        // Sort the entries by their bins, crowded bins first.
+        let (parts, counts) = self.crowd(&range);
+        let Some(counts) = counts.get_mut(..1 << bits) else { return };
         let mut next = starts(counts);
         for count in &mut *counts {
             let next = &mut next[usize::from(*count as usize <= CROWD)];
-            *next += *count;
-            *count = *next;
+            *next += core::mem::replace(count, *next);
         }
-        permute(entries, counts, shift);
+        sort_by_bin(parts, counts, shift);
     }
 
     /// Returns the entries of a crowded unit in two parts, with room for two numbers for each, and the counts of all
