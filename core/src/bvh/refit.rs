@@ -2,18 +2,23 @@
 //!
 //! ```text
 //! check   the mesh has the triangles of the tree; walking down from the root meets each node once
-//! refit   depth first: the boxes of a node's leaves, then those of its child nodes, which are on the stack
-//!         once these are done; quantise all eight, hand their union to the parent
+//! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; the box of a
+//!         leaf is the union of eight of these; quantise all eight boxes, hand their union to the parent
 //! ```
 //!
 //! The check finds all errors, so nothing is written before an error. The boxes are those of a build with
 //! the same leaves.
 
+use core::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x8};
 use glam::Vec3A;
 
 use super::build::least_node;
-use super::node::{Child, LEAF, Node, WIDTH};
-use super::walk::FEW_LEVELS;
+use super::node::{Child, LEAF, Node, Sides, WIDTH};
+use super::subtree::slow_sides;
+use super::walk::{FEW_LEVELS, bytes};
 use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
 use crate::arena::split_mut;
@@ -21,16 +26,22 @@ use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
 use crate::config::BuildFlags;
 use crate::control::Watch;
+use crate::eight::load;
 use crate::error::Error;
+use crate::extremes::Extremes;
 use crate::invariant::OrBug;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{LastPart, TriangleMesh};
+use crate::simd::{Kernel, SimdLevel, dispatch};
 use crate::survey::Survey;
 
 /// Gives a tree the boxes of a mesh that moved, in a blob that opens; returns the SAH costs before and after.
 pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2], Error> {
     let mut header = Header::read(blob, mesh)?;
     check_mesh(&header, mesh)?;
-    let (levels, before) = Bvh::open(&header, blob)?.check(&header, mesh)?;
+    let level = SimdLevel::detect();
+    let bvh = Bvh::open(&header, blob)?;
+    bvh.check_ids(&header, mesh)?;
+    let (levels, before) = dispatch(level, Check(&bvh))?;
     let scene = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
     let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
         let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
@@ -39,9 +50,9 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
     let tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
     let (bounds, after) = if levels <= FEW_LEVELS {
-        tree.refit::<{ FEW_LEVELS as usize }>()
+        dispatch(level, Refit::<{ FEW_LEVELS as usize }>(tree))
     } else {
-        tree.refit::<{ LEVELS as usize }>()
+        dispatch(level, Refit::<{ LEVELS as usize }>(tree))
     };
     let scene = Lattice::pad(&bounds);
     (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
@@ -52,10 +63,13 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
 }
 
 impl Bvh<'_> {
-    /// Finds all that could be wrong with nodes and ids; returns the levels of nodes and the SAH cost.
-    fn check(&self, header: &Header, mesh: &TriangleMesh<'_>) -> Result<(u32, f64), Error> {
+    /// Checks that all ids name triangles of the mesh, and finite ones.
+    fn check_ids(&self, header: &Header, mesh: &TriangleMesh<'_>) -> Result<(), Error> {
         let triangles = mesh.triangle_count();
-        if let Some(word) = self.ids.iter().position(|&id| id >= triangles) {
+        // Most ids are right, which the largest one tells sooner than each.
+        if self.ids.iter().fold(0, |largest, &id| largest.max(id)) >= triangles
+            && let Some(word) = self.ids.iter().position(|&id| id >= triangles)
+        {
             return Err(Self::wrong_id(word as u64));
         }
         // The build left triangles out, so the mesh may have non-finite ones: none of them may be in a leaf.
@@ -67,28 +81,35 @@ impl Bvh<'_> {
                 }
             }
         }
+        Ok(())
+    }
+}
+
+/// Finds all that could be wrong with nodes; returns the levels of nodes and the SAH cost.
+struct Check<'b>(&'b Bvh<'b>);
+
+impl Kernel for Check<'_> {
+    type Output = Result<(u32, f64), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self(bvh) = self;
         // Every node on the way down, and its child nodes that are still to be looked at.
         let mut path = [(0, 0); LEVELS as usize];
         let (mut depth, mut deepest) = (0, 1);
-        let mut unmet = self.nodes.len();
+        let mut unmet = bvh.nodes.len();
         let mut cost = Cost::default();
         let mut next = Some(0_u32);
         loop {
             if let Some(number) = next.take() {
-                let node = self.nodes.get(number as usize).ok_or(self.wrong_node(number))?;
-                unmet = unmet.checked_sub(1).ok_or(self.wrong_node(number))?;
-                for slot in 0..8 {
-                    let Child::Leaf { first, count } = node.child(slot) else { continue };
-                    let end = u64::from(first) + u64::from(count);
-                    let is_inside = count == 0 || end <= self.ids.len() as u64;
-                    if count as usize > LEAF || !is_inside {
-                        return Err(self.wrong_node(number));
-                    }
-                }
-                *path.get_mut(depth).ok_or(self.wrong_node(number))? = (number, node.inner());
+                let node = bvh.nodes.get(number as usize).ok_or(bvh.wrong_node(number))?;
+                unmet = unmet.checked_sub(1).ok_or(bvh.wrong_node(number))?;
+                let ids = node.ids_of_leaves().and_then(|ids| bvh.ids.get(ids));
+                ids.ok_or(bvh.wrong_node(number))?;
+                *path.get_mut(depth).ok_or(bvh.wrong_node(number))? = (number, node.inner());
                 depth += 1;
                 deepest = deepest.max(depth);
-                cost.add(node, number == 0);
+                cost.add(simd, node, number == 0);
             }
             let above = depth.checked_sub(1).and_then(|above| path.get_mut(above));
             let Some((number, rest)) = above else { break };
@@ -98,7 +119,7 @@ impl Bvh<'_> {
             }
             let slot = rest.trailing_zeros();
             *rest &= *rest - 1;
-            let node = self.nodes.get(*number as usize).ok_or(self.wrong_node(*number))?;
+            let node = bvh.nodes.get(*number as usize).ok_or(bvh.wrong_node(*number))?;
             if let Child::Inner(child) = node.child(slot) {
                 next = Some(child);
             }
@@ -120,50 +141,39 @@ struct Tree<'b> {
     least: f32,
 }
 
-/// The corners of a box, tight.
-type BoxCorners = [[f32; 3]; 2];
+/// A tree of at most `N` levels that gets new boxes.
+struct Refit<'b, const N: usize>(Tree<'b>);
 
-/// A node whose children get their boxes.
+/// A node on the way down.
 #[derive(Clone, Copy)]
 struct RefitNode {
     number: u32,
-    /// Child nodes that have no box yet, and the one that is about to get it.
+    /// Child nodes that have no box yet.
     rest: u32,
+    /// The child node that is about to get its box.
     slot: u32,
-    boxes: [BoxCorners; WIDTH],
+    /// The boxes of child nodes: min, and max with other signs.
+    boxes: [[f32; 6]; WIDTH],
 }
 
-impl Tree<'_> {
-    /// Writes the boxes of all nodes, in no more than `N` levels; returns the root's and the SAH cost.
-    #[inline(never)]
-    fn refit<const N: usize>(self) -> (Aabb, f64) {
-        let Self { mesh, ids, nodes, least } = self;
-        let mut reader = mesh.reader();
-        let none = [[0.0; 3]; 2];
-        let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [none; WIDTH] }; N];
+impl<const N: usize> Kernel for Refit<'_, N> {
+    type Output = (Aabb, f64);
+
+    /// Writes the boxes of all nodes; returns the root's and the SAH cost.
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self(Tree { mesh, ids, nodes, least }) = self;
+        let mut near = mesh.part_around(ids.first().copied().unwrap_or(0));
+        let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [[0.0; 6]; WIDTH] }; N];
+        // The boxes of the triangles of a node, and room to read eight behind any of them.
+        let mut boxes = [[f32::INFINITY; 8]; WIDTH * LEAF + LEAF];
         let mut cost = Cost::default();
         let (mut depth, mut next) = (0, Some(0_u32));
         while let Some(level) = levels.get_mut(depth) {
+            // Enter a node, then go down into those of its children that are nodes.
             if let Some(number) = next.take() {
-                level.number = number;
                 let node = nodes.get(number as usize).or_bug("a child that is no node");
-                let Some(node) = node else { break };
-                level.rest = node.inner();
-                for (slot, corners) in (0..).zip(&mut level.boxes) {
-                    let mut bounds = Aabb::EMPTY;
-                    // The first id of an unused slot may lie anywhere: the check does not look at it.
-                    if let Child::Leaf { first, count: count @ 1.. } = node.child(slot) {
-                        let first = first as usize;
-                        let leaf = ids.get(first..first.saturating_add(count as usize));
-                        for &id in leaf.or_bug("a leaf behind the ids").unwrap_or_default() {
-                            let corners = reader.corners(id).or_bug("no such triangle");
-                            let Some([a, b, c]) = corners else { continue };
-                            bounds.min = bounds.min.min(a.min(b).min(c));
-                            bounds.max = bounds.max.max(a.max(b).max(c));
-                        }
-                    }
-                    *corners = [bounds.min.to_array(), bounds.max.to_array()];
-                }
+                (level.number, level.rest) = (number, node.map_or(0, Node::inner));
             }
             let node = nodes.get_mut(level.number as usize).or_bug("a child that is no node");
             let Some(node) = node else { break };
@@ -176,26 +186,77 @@ impl Tree<'_> {
                 }
                 continue;
             }
-            let boxes = level.boxes.map(|[min, max]| Aabb {
-                min: Vec3A::from_array(min),
-                max: Vec3A::from_array(max),
-            });
-            let bounds = boxes.iter().fold(Aabb::EMPTY, |all, child| all.union(child));
-            if node.used() != 0 {
-                node.set_boxes(&bounds, &boxes, least);
+
+            // Read the boxes of all triangles in its leaves.
+            let leaves = node.ids_of_leaves().and_then(|leaves| ids.get(leaves));
+            for (&id, sides) in
+                leaves.or_bug("a leaf behind the ids").unwrap_or_default().iter().zip(&mut boxes)
+            {
+                read(simd, mesh, &mut near, id, sides);
             }
-            cost.add(node, level.number == 0);
-            let Some(above) = depth.checked_sub(1) else { return (bounds, cost.total()) };
+            // Unite the boxes of each child, eight of a leaf, and quantise.
+            let (used, mut first) = (node.used(), 0);
+            let mut bounds = f32x8::splat(simd, f32::INFINITY);
+            let mut children = [bounds; WIDTH];
+            for (slot, child) in children.iter_mut().enumerate() {
+                let count = usize::from(node.counts[slot]);
+                if node.inner() >> slot & 1 == 1 {
+                    let [x, y, z, u, v, w] = level.boxes[slot];
+                    *child = f32x8::simd_from(simd, [x, y, z, 0.0, u, v, w, 0.0]);
+                } else if let Some(last) = count.checked_sub(1) {
+                    for place in 0..LEAF {
+                        let sides = boxes.get(first + place.min(last)).copied();
+                        let sides = sides.or_bug("a child without a box").unwrap_or([0.0; 8]);
+                        *child = child.lesser(f32x8::simd_from(simd, sides));
+                    }
+                }
+                first += count;
+                bounds = bounds.lesser(*child);
+            }
+            let [x, y, z, _, u, v, w, _]: Sides = bounds.into();
+            if used != 0 {
+                let count = (u32::BITS - used.leading_zeros()) as usize;
+                node.set_sides(simd, bounds, &children, count, least);
+            }
+            cost.add(simd, node, level.number == 0);
+            let Some(above) = depth.checked_sub(1) else {
+                let bounds = Aabb { min: Vec3A::new(x, y, z), max: -Vec3A::new(u, v, w) };
+                return (bounds, cost.total());
+            };
             depth = above;
             if let Some(RefitNode { slot, boxes, .. }) = levels.get_mut(above)
-                && let Some(corners) = boxes.get_mut(*slot as usize)
+                && let Some(sides) = boxes.get_mut(*slot as usize)
             {
-                *corners = [bounds.min.to_array(), bounds.max.to_array()];
+                *sides = [x, y, z, u, v, w];
             }
         }
         debug_assert!(false, "the check did not walk the same way");
         (Aabb::EMPTY, cost.total())
     }
+}
+
+/// Reads the box of a triangle.
+#[inline(always)]
+fn read<'m, S: Simd>(
+    simd: S,
+    mesh: &TriangleMesh<'m>,
+    near: &mut LastPart<'m>,
+    id: u32,
+    sides: &mut Sides,
+) {
+    let mut found = near.corners(id);
+    if found.is_none() {
+        *near = mesh.part_around(id);
+        found = near.corners(id);
+    }
+    let Some([a, b, c]) = found else {
+        *sides = slow_sides(mesh, id);
+        return;
+    };
+    let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
+    let (low, high): (f32x4<S>, f32x4<S>) = (a.lesser(b).lesser(c), a.greater(b).greater(c));
+    // Store all eight numbers at once: a load that spans two stores would wait for both.
+    low.combine(f32x4::splat(simd, 0.0) - high).store_slice(sides);
 }
 
 /// Checks that every triangle names vertices of the mesh, and that at least as many triangles are non-finite as the
@@ -228,8 +289,8 @@ struct Cost {
 
 impl Cost {
     #[inline(always)]
-    fn add(&mut self, node: &Node, is_root: bool) {
-        self.sum += node.weight();
+    fn add<S: Simd>(&mut self, simd: S, node: &Node, is_root: bool) {
+        self.sum += node.weight(simd);
         if is_root {
             self.area = node.surface();
         }
@@ -242,21 +303,36 @@ impl Cost {
 }
 
 impl Node {
-    /// Half the surfaces of the children's boxes, each times what it costs to enter it: one for a node, and
-    /// one for each triangle of a leaf.
-    fn weight(&self) -> f64 {
-        let mut sums = [0_u32; 3];
-        for slot in 0..WIDTH {
-            let is_inner = self.inner() >> slot & 1;
-            let cost = is_inner + u32::from(self.counts[slot]);
-            let [x, y, z] = [0, 1, 2].map(|axis| {
-                u32::from(self.bounds[axis + 3][slot].saturating_sub(self.bounds[axis][slot]))
-            });
-            sums[0] += cost * x * y;
-            sums[1] += cost * y * z;
-            sums[2] += cost * z * x;
+    /// The places of the ids in all leaves of a node; `None` if a leaf has too many.
+    #[inline(always)]
+    fn ids_of_leaves(&self) -> Option<Range<usize>> {
+        let largest = self.counts.iter().fold(0, |largest, &count| largest.max(count));
+        let count = self.counts.iter().fold(0, |sum, &count| sum + u32::from(count));
+        if usize::from(largest) > LEAF {
+            return None;
         }
-        self.area(sums)
+        // The first id of a node without leaves may lie anywhere.
+        let first = if count == 0 { 0 } else { self.first };
+        Some(first as usize..(first as usize).checked_add(count as usize)?)
+    }
+
+    /// Half the surfaces of the children's boxes, each times what it costs to enter it: one for a node, and
+    /// one for each triangle of a leaf. The numbers are whole and small, so their sums in f32 are exact.
+    #[inline(always)]
+    fn weight<S: Simd>(&self, simd: S) -> f64 {
+        let inner = core::array::from_fn(|slot| (self.inner() >> slot & 1) as u8);
+        let (inner, counts) = bytes(simd, inner, self.counts);
+        let cost = inner + counts;
+        let [a, b, c, d, e, f] = self.bounds;
+        let (x, y, z) = (bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f));
+        let none = f32x8::splat(simd, 0.0);
+        let x = (x.1 - x.0).greater(none);
+        let y = (y.1 - y.0).greater(none);
+        let z = (z.1 - z.0).greater(none);
+        let (cost_x, cost_z) = (cost * x, cost * z);
+        let products: [[f32; WIDTH]; 3] =
+            [(cost_x * y).into(), (cost_z * y).into(), (cost_z * x).into()];
+        self.area(products.map(|areas| areas.iter().sum()))
     }
 
     /// Half the surface of the box around all children.
@@ -264,7 +340,7 @@ impl Node {
         let extent = |low: &[u8; 8], high: &[u8; 8]| {
             let low = low.iter().min().copied().unwrap_or(0);
             let high = high.iter().max().copied().unwrap_or(0);
-            u32::from(high.saturating_sub(low))
+            f32::from(high.saturating_sub(low))
         };
         let [min_x, min_y, min_z, max_x, max_y, max_z] = &self.bounds;
         let [x, y, z] = [extent(min_x, max_x), extent(min_y, max_y), extent(min_z, max_z)];
@@ -272,7 +348,8 @@ impl Node {
     }
 
     /// Products of steps in x and y, y and z, z and x, as a surface.
-    fn area(&self, products: [u32; 3]) -> f64 {
+    #[inline(always)]
+    fn area(&self, products: [f32; 3]) -> f64 {
         let [x, y, z] = self.steps().map(f64::from);
         let [xy, yz, zx] = products.map(f64::from);
         xy * (x * y) + yz * (y * z) + zx * (z * x)

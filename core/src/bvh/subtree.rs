@@ -308,7 +308,7 @@ pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
 /// [`slow_bounds`] as sides.
 #[cold]
 #[inline(never)]
-fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
+pub(crate) fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     let bounds = slow_bounds(mesh, id);
     let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
     [x, y, z, 0.0, u, v, w, 0.0]

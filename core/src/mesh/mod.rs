@@ -377,16 +377,39 @@ impl<'a> TriangleMesh<'a> {
             let count = piece.mesh.vertex_count();
             let has_all =
                 |id| piece.mesh.vertices_of(id).is_some_and(|all| all.iter().all(|&at| at < count));
-            Some(piece.first + piece.triangles.clone().find(|&id| !has_all(id))?)
+            // Look for it only where the largest index of many triangles is too large.
+            let mut start = piece.triangles.start;
+            if matches!(piece.mesh.layout, IndexLayout::Indexed(IndexType::U32)) {
+                let tight = piece.mesh.indices.tight::<12>(start as usize, piece.triangles.len());
+                for bytes in tight.as_chunks::<16>().0 {
+                    let indices: [u32; 48] = transmute!(*bytes);
+                    let largest = indices.iter().fold(0, |most, &at| most.max(at));
+                    if largest as usize >= count {
+                        break;
+                    }
+                    start += 16;
+                }
+            }
+            Some(piece.first + (start..piece.triangles.end).find(|&id| !has_all(id))?)
         })
     }
 
     /// Returns true if all coordinates of all vertices, used or not, are finite and no larger than `MAX_COORDINATE`.
     pub(crate) fn is_finite(&self) -> bool {
-        let limit = MAX_COORDINATE;
-        let is_finite = |xyz: [f32; 3]| xyz.iter().all(|c| c.abs() <= limit);
-        self.each_mesh()
-            .all(|mesh| (0..mesh.vertex_count()).all(|at| mesh.vertex(at).is_some_and(is_finite)))
+        // One question about many vertices at a time takes vectors.
+        let are_finite =
+            |numbers: &[f32]| numbers.iter().fold(true, |are, c| are & (c.abs() <= MAX_COORDINATE));
+        self.each_mesh().all(|mesh| {
+            let count = mesh.vertex_count();
+            let tight = mesh.positions.tight::<12>(0, count).as_chunks::<16>().0;
+            let are_tight_finite = tight.iter().all(|bytes| {
+                let numbers: [f32; 48] = transmute!(*bytes);
+                are_finite(&numbers)
+            });
+            are_tight_finite
+                && (tight.len() * 16..count)
+                    .all(|at| mesh.vertex(at).is_some_and(|vertex| are_finite(&vertex)))
+        })
     }
 
     /// The corners of a triangle as vectors.
