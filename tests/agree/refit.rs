@@ -1,8 +1,8 @@
 //! A tree that was refitted to moved vertices answers as brute force does on the moved mesh.
 
 use hgrid_core::{
-    Block, BuildFlags, ClosestPoint, Config, Error, Grid, MAX_COORDINATE, Method, QueryOptions,
-    Ray, TriangleMesh, refit,
+    Block, BuildFlags, ClosestPoint, Config, Error, Grid, IndexType, MAX_COORDINATE, MeshPart,
+    Method, Parameters, Quality, QueryOptions, Ray, Strided, TriangleMesh, refit,
 };
 use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
@@ -77,6 +77,37 @@ fn a_refitted_tree_answers_as_brute_force_and_is_valid() {
             assert_eq!(grid.bounds(), built.open(&view).unwrap().bounds(), "{which}");
         }
         assert!(copy.bytes() == built, "vertices that moved back");
+    }
+}
+
+/// Expects a refit to vertices that did not move to change no byte of a tree.
+fn stays_as_it_is(mesh: &TriangleMesh<'_>, config: &Config) {
+    let mut copy = Copy::of(Owned::build(mesh, config).unwrap().bytes());
+    let built = copy.bytes().to_vec();
+    refit(copy.bytes_mut(), mesh).unwrap();
+    assert!(copy.bytes() == built, "{config:?}");
+}
+
+#[test]
+fn vertices_that_did_not_move_leave_trees_of_all_kinds_as_they_are() {
+    // Smaller triangles nearer to a corner: a tree of more levels than most.
+    let mut deep = Mesh::default();
+    for size in 0..60 {
+        deep.append(&soup(10, 0.1, size).scaled(0.5_f32.powi(i32::try_from(size).unwrap())));
+    }
+    let high = Config::from(Parameters::Bvh { quality: Quality::High });
+    for mesh in [soup(700, 0.2, 5), deep] {
+        let narrow: Vec<_> =
+            mesh.indices.iter().map(|all| all.map(|at| u16::try_from(at).unwrap())).collect();
+        let (positions, indices) = (Strided::new(&mesh.positions), Strided::new(&narrow));
+        let narrow = TriangleMesh::strided(positions, indices, IndexType::U16).unwrap();
+        for config in [Config::new(Method::Bvh), high] {
+            let mut parts = [MeshPart::new(narrow), MeshPart::new(mesh.view())];
+            let joined = TriangleMesh::join(&mut parts).unwrap();
+            for mesh in [narrow, mesh.view(), joined] {
+                stays_as_it_is(&mesh, &config);
+            }
+        }
     }
 }
 

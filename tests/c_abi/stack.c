@@ -402,6 +402,8 @@ static void work(const job *all)
     CHECK(hgrid_validate_bytes(&grid) <= sizeof bits);
     CHECK(hgrid_validate(&grid, bits, sizeof bits) == HGRID_OK);
     CHECK(hgrid_inspect(&grid, &statistics) == HGRID_OK);
+    if (all->config.method == HGRID_METHOD_BVH)
+        CHECK(hgrid_refit(&mesh, all->index, index_bytes, &grid, NULL) == HGRID_OK);
 }
 
 static void build(void)

@@ -3,7 +3,7 @@
 //! ```text
 //! centers     read each triangle once: store min + max of its box, find the box around all centres
 //! new keys    for eight triangles: keys of their centres in that box; count the bin of each
-//! sort        move the entries to where the numbers of centres were, bin after bin, and back
+//! sort        move each entry to the next place of its bin, in the memory of the centres, then all back
 //!
 //! min + max (twice the centre) is stored: z in the entry, x and y in two arrays
 //! ```
@@ -103,8 +103,9 @@ fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
     }
 }
 
-/// Sorts the entries of a crowded unit by their bins; in a bin they keep their order. `heads` has where each bin starts.
-/// Each entry moves to its place in the room of the centres, and back from there.
+/// Sorts the entries of a crowded unit by their bins; in a bin they keep their order. `heads` holds the place where
+/// each bin starts, and afterwards where it ends. Each entry moves to its place in the room of the centres, and back
+/// from there.
 pub(crate) fn sort_by_bin(mut parts: [CrowdPart<'_>; 2], heads: &mut [u32], shift: u32) {
     let middle = parts[0].entries.len();
     for from in [0, 1] {

@@ -20,7 +20,8 @@
 //!   A crowded bin has more than [`CROWD`] triangles, and divisions nest at most [`DIVISIONS`] deep.
 //!
 //! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles. A bin is
-//! sorted with `spare` as the second buffer; only bins of more than [`CROWD`] entries need more of it than that.
+//! sorted with `spare` as the second buffer. Only bins of more than [`CROWD`] entries need more of it than that: room
+//! for their centres that the index does not have, 8 bytes a triangle without an index.
 //!
 //! So constants bound index and scratch, those of a build with one task (`HGRID_INDEX_BOUND`, 16 n + 640, and
 //! `HGRID_SCRATCH_BOUND`, 17 n + 320, in C; a test compares them for many `n`):

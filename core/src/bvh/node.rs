@@ -178,15 +178,15 @@ impl Node {
         }
     }
 
-    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. Only the first `count`
-    /// children exist.
+    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. `used` has a bit for
+    /// each child that exists.
     #[inline(always)]
     pub(crate) fn set_sides<S: Simd>(
         &mut self,
         simd: S,
         bounds: f32x8<S>,
         children: &[f32x8<S>; WIDTH],
-        count: usize,
+        used: u32,
         least: f32,
     ) {
         // The frame of three axes at once.
@@ -213,8 +213,8 @@ impl Node {
         let sign = f32x4::splat(simd, 1.0).combine(f32x4::splat(simd, -1.0));
         let unused = u32x4::splat(simd, 0xff).combine(u32x4::splat(simd, 0));
         let rule = Quantiser { origin, inverse, end, sign, unused };
-        let first: [u32; 8] = rule.four(children, 0, count).into();
-        let second: [u32; 8] = rule.four(children, 4, count).into();
+        let first: [u32; 8] = rule.four(children, 0, used).into();
+        let second: [u32; 8] = rule.four(children, 4, used).into();
         for (row, lane) in self.bounds.iter_mut().zip([0, 1, 2, 4, 5, 6]) {
             *row = (u64::from(first[lane]) | u64::from(second[lane]) << 32).to_le_bytes();
         }
@@ -275,19 +275,19 @@ struct Quantiser<S: Simd> {
 impl<S: Simd> Quantiser<S> {
     /// The sides of four children, lane by lane the bytes of one word.
     #[inline(always)]
-    fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, count: usize) -> u32x8<S> {
-        let a = self.one(children, first, count);
-        let b = self.one(children, first + 1, count);
-        let c = self.one(children, first + 2, count);
-        let d = self.one(children, first + 3, count);
+    fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, used: u32) -> u32x8<S> {
+        let a = self.one(children, first, used);
+        let b = self.one(children, first + 1, used);
+        let c = self.one(children, first + 2, used);
+        let d = self.one(children, first + 3, used);
         (a | b << 8) | (c | d << 8) << 16
     }
 
     #[inline(always)]
-    fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, count: usize) -> u32x8<S> {
+    fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, used: u32) -> u32x8<S> {
         let at = (children[slot % WIDTH] - self.origin) * self.inverse - (0.5 + MARGIN);
         let bits = (at.greater(self.end) * self.sign + WHOLE_SHIFT).bitcast::<u32x8<S>>() & 0xff;
-        if slot < count { bits } else { self.unused }
+        if used >> slot & 1 == 1 { bits } else { self.unused }
     }
 }
 
@@ -411,7 +411,8 @@ mod tests {
                 f32x8::simd_from(simd, [x, y, z, 0.0, u, v, w, 0.0])
             };
             let boxes = self.boxes.map(|bounds| sides(&bounds));
-            self.node.set_sides(simd, sides(&self.bounds), &boxes, self.count, self.least);
+            let used = (1 << self.count) - 1;
+            self.node.set_sides(simd, sides(&self.bounds), &boxes, used, self.least);
         }
     }
 

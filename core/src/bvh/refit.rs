@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! check   the mesh has the triangles of the tree; walking down from the root meets each node once
-//! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; the box of a
-//!         leaf is the union of eight of these; quantise all eight boxes, hand their union to the parent
+//! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; unite those of
+//!         each leaf, the last of them repeated up to eight; quantise, hand the union of all to the parent
 //! ```
 //!
 //! The check finds all errors, so nothing is written before an error. The boxes are those of a build with
@@ -17,7 +17,6 @@ use glam::Vec3A;
 
 use super::build::least_node;
 use super::node::{Child, LEAF, Node, Sides, WIDTH};
-use super::subtree::slow_sides;
 use super::walk::{FEW_LEVELS, bytes};
 use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
@@ -30,7 +29,7 @@ use crate::eight::load;
 use crate::error::Error;
 use crate::extremes::Extremes;
 use crate::invariant::OrBug;
-use crate::mesh::{LastPart, TriangleMesh};
+use crate::mesh::{LastPart, Reader, TriangleMesh};
 use crate::simd::{Kernel, SimdLevel, dispatch};
 use crate::survey::Survey;
 
@@ -165,8 +164,9 @@ impl<const N: usize> Kernel for Refit<'_, N> {
         let Self(Tree { mesh, ids, nodes, least }) = self;
         let mut near = mesh.part_around(ids.first().copied().unwrap_or(0));
         let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [[0.0; 6]; WIDTH] }; N];
-        // The boxes of the triangles of a node, and room to read eight behind any of them.
-        let mut boxes = [[f32::INFINITY; 8]; WIDTH * LEAF + LEAF];
+        let mut reader = mesh.reader();
+        // The boxes of the triangles of a node.
+        let mut boxes = [[f32::INFINITY; 8]; WIDTH * LEAF];
         let mut cost = Cost::default();
         let (mut depth, mut next) = (0, Some(0_u32));
         while let Some(level) = levels.get_mut(depth) {
@@ -192,9 +192,10 @@ impl<const N: usize> Kernel for Refit<'_, N> {
             for (&id, sides) in
                 leaves.or_bug("a leaf behind the ids").unwrap_or_default().iter().zip(&mut boxes)
             {
-                read(simd, mesh, &mut near, id, sides);
+                read(simd, mesh, &mut near, &mut reader, id, sides);
             }
-            // Unite the boxes of each child, eight of a leaf, and quantise.
+            // Unite the boxes of each child, and quantise. A leaf repeats its last box up to eight, as a branch on the
+            // number of its triangles would be mispredicted.
             let (used, mut first) = (node.used(), 0);
             let mut bounds = f32x8::splat(simd, f32::INFINITY);
             let mut children = [bounds; WIDTH];
@@ -215,8 +216,7 @@ impl<const N: usize> Kernel for Refit<'_, N> {
             }
             let [x, y, z, _, u, v, w, _]: Sides = bounds.into();
             if used != 0 {
-                let count = (u32::BITS - used.leading_zeros()) as usize;
-                node.set_sides(simd, bounds, &children, count, least);
+                node.set_sides(simd, bounds, &children, used, least);
             }
             cost.add(simd, node, level.number == 0);
             let Some(above) = depth.checked_sub(1) else {
@@ -235,22 +235,27 @@ impl<const N: usize> Kernel for Refit<'_, N> {
     }
 }
 
-/// Reads the box of a triangle.
+/// Reads the box of a triangle: from the part that was read last, in vectors, or one by one where the mesh cannot be
+/// read so.
 #[inline(always)]
 fn read<'m, S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'m>,
     near: &mut LastPart<'m>,
+    reader: &mut Reader<'_>,
     id: u32,
     sides: &mut Sides,
 ) {
     let mut found = near.corners(id);
-    if found.is_none() {
+    if found.is_none() && !near.own(id).0.is_empty() {
         *near = mesh.part_around(id);
         found = near.corners(id);
     }
     let Some([a, b, c]) = found else {
-        *sides = slow_sides(mesh, id);
+        let corners = reader.corners(id).or_bug("no such triangle").unwrap_or_default();
+        let [a, b, c] = corners;
+        let ([x, y, z], [u, v, w]) = (a.min(b).min(c).to_array(), (-a.max(b).max(c)).to_array());
+        *sides = [x, y, z, 0.0, u, v, w, 0.0];
         return;
     };
     let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
@@ -316,8 +321,8 @@ impl Node {
         Some(first as usize..(first as usize).checked_add(count as usize)?)
     }
 
-    /// Half the surfaces of the children's boxes, each times what it costs to enter it: one for a node, and
-    /// one for each triangle of a leaf. The numbers are whole and small, so their sums in f32 are exact.
+    /// Half the surfaces of the children's boxes, each times what it costs to enter it: one for a node, and one for
+    /// each triangle of a leaf. A leaf has no more than [`LEAF`], so the sums are below 2^23, and exact in f32.
     #[inline(always)]
     fn weight<S: Simd>(&self, simd: S) -> f64 {
         let inner = core::array::from_fn(|slot| (self.inner() >> slot & 1) as u8);

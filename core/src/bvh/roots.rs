@@ -7,12 +7,15 @@
 //!     else:    sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
-//! spare   | second buffer of the sort | untouched |
+//! spare   | centres of a crowded unit, then second buffer of the sorts | untouched |
 //! ```
 //!
 //! Two of the three numbers of each centre of a crowded unit are stored in places that the build writes later in any
 //! case: of the ids of the unit, and of as many nodes as any tree over the triangles has. What has no room there is
-//! stored in `spare`. All that is free again when the unit is binned, so it is the second buffer then. The record of a root is 112 bytes, written over entries that were used up:
+//! stored in `spare`. Once the entries have new keys, no centre is needed any more, and the same memory is the second
+//! buffer when they are sorted by bins.
+//!
+//! The record of a root is 112 bytes, written over entries that were used up:
 //! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
@@ -79,13 +82,13 @@ pub(crate) struct Roots<'w> {
     pub(crate) least: f32,
     /// The entries, over which the records are written.
     pub(crate) entries: &'w mut [Entry],
-    /// Room for the entries of any unit: as long as `entries` if units are crowded.
+    /// Room for the entries of any unit that is sorted: as long as `entries` if units are crowded.
     pub(crate) spare: &'w mut [Entry],
-    /// The ids, each at the place of its entry; empty if only the size is computed.
+    /// The ids, each at the place of its entry, and before them centres; empty without an index or room in it.
     pub(crate) ids: &'w mut [u32],
     /// Place of the first id in the index.
     pub(crate) first: u32,
-    /// Destination of the nodes.
+    /// Destination of the nodes, and before them of centres.
     pub(crate) nodes: &'w mut [Node],
     /// The number of the first of the nodes in the index.
     pub(crate) child: u32,
@@ -243,7 +246,8 @@ impl Roots<'_> {
     /// bins. The room of the first part lies in the index.
     #[inline(never)]
     fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 2], &mut [u32]) {
-        // Every 64 triangles need a node at least. The root of the tree lies before these.
+        // A tree has a node for every 64 triangles at least, and `nodes` begins behind its root. To write to later ones
+        // could change bytes behind a small blob.
         let nodes = (self.entries.len() / (WIDTH * LEAF)).saturating_sub(1);
         let nodes = self.nodes.get_mut(self.node_count as usize..nodes).unwrap_or_default();
         let ys = whole::<u32>(nodes.as_mut_bytes());

@@ -288,7 +288,7 @@ impl Subtree {
             bounds = bounds.lesser(*sides);
             used += 1;
         }
-        node.set_sides(simd, bounds, &boxes, used, least);
+        node.set_sides(simd, bounds, &boxes, (1 << used) - 1, least);
         node.first += places[0];
         node.child = (node.child + places[1]).wrapping_sub(1);
         if let Some(slot) = self.boxes.get_mut(OF_NODES + at) {
@@ -302,13 +302,13 @@ impl Subtree {
 #[inline(never)]
 pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
     let bounds = mesh.corners(id).and_then(Aabb::of);
-    bounds.or_bug("an entry is not of a finite triangle").unwrap_or(Aabb::EMPTY)
+    bounds.or_bug("a triangle of the tree is not finite").unwrap_or(Aabb::EMPTY)
 }
 
 /// [`slow_bounds`] as sides.
 #[cold]
 #[inline(never)]
-pub(crate) fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
+fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     let bounds = slow_bounds(mesh, id);
     let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
     [x, y, z, 0.0, u, v, w, 0.0]

@@ -23,7 +23,7 @@ use crate::error::{Error, MeshField};
 use crate::limits::{MAX_COORDINATE, MAX_TRIANGLES};
 use crate::method::Content;
 pub use parts::MeshPart;
-pub(crate) use parts::{LastPart, Piece};
+pub(crate) use parts::{LastPart, Piece, Reader};
 pub use strided::Strided;
 pub(crate) use wide::{WideMesh, vector};
 
