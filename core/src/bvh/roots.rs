@@ -84,11 +84,12 @@ pub(crate) struct Roots<'w> {
     pub(crate) entries: &'w mut [Entry],
     /// Room for the entries of any unit that is sorted: as long as `entries` if units are crowded.
     pub(crate) spare: &'w mut [Entry],
-    /// The ids, each at the place of its entry, and before them centres; empty without an index or room in it.
+    /// The ids, each at the place of its entry; until then, centres of crowded units. Empty without an index, or in one
+    /// that is too small.
     pub(crate) ids: &'w mut [u32],
     /// Place of the first id in the index.
     pub(crate) first: u32,
-    /// Destination of the nodes, and before them of centres.
+    /// Destination of the nodes; until then, of centres of crowded units.
     pub(crate) nodes: &'w mut [Node],
     /// The number of the first of the nodes in the index.
     pub(crate) child: u32,
@@ -246,8 +247,8 @@ impl Roots<'_> {
     /// bins. The room of the first part lies in the index.
     #[inline(never)]
     fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 2], &mut [u32]) {
-        // A tree has a node for every 64 triangles at least, and `nodes` begins behind its root. To write to later ones
-        // could change bytes behind a small blob.
+        // A tree has at least one node for every 64 triangles, and `nodes` begins behind its root. A write to later
+        // nodes could change bytes behind a small blob.
         let nodes = (self.entries.len() / (WIDTH * LEAF)).saturating_sub(1);
         let nodes = self.nodes.get_mut(self.node_count as usize..nodes).unwrap_or_default();
         let ys = whole::<u32>(nodes.as_mut_bytes());

@@ -377,7 +377,7 @@ impl<'a> TriangleMesh<'a> {
             let count = piece.mesh.vertex_count();
             let has_all =
                 |id| piece.mesh.vertices_of(id).is_some_and(|all| all.iter().all(|&at| at < count));
-            // Look for it only where the largest index of many triangles is too large.
+            // Skip triangles sixteen at a time, as long as their largest index is a vertex.
             let mut start = piece.triangles.start;
             if matches!(piece.mesh.layout, IndexLayout::Indexed(IndexType::U32)) {
                 let tight = piece.mesh.indices.tight::<12>(start as usize, piece.triangles.len());
@@ -396,7 +396,7 @@ impl<'a> TriangleMesh<'a> {
 
     /// Returns true if all coordinates of all vertices, used or not, are finite and no larger than `MAX_COORDINATE`.
     pub(crate) fn is_finite(&self) -> bool {
-        // One question about many vertices at a time takes vectors.
+        // The compiler uses vectors if no branch follows each number.
         let are_finite =
             |numbers: &[f32]| numbers.iter().fold(true, |are, c| are & (c.abs() <= MAX_COORDINATE));
         self.each_mesh().all(|mesh| {
