@@ -47,13 +47,16 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
         Some((&*ids, split_mut::<Node>(behind, header.node_count.into())?.0))
     });
     let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-    let tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
-    let (bounds, after) = if levels <= FEW_LEVELS {
-        dispatch(level, Refit::<{ FEW_LEVELS as usize }>(tree))
-    } else {
-        dispatch(level, Refit::<{ LEVELS as usize }>(tree))
-    };
+    let mut tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
+    let (mut bounds, mut after) = tree.refit(level, levels);
     let scene = Lattice::pad(&bounds);
+    // Vertices that no triangle uses count for nothing in a build. If they made the least step larger, start anew.
+    let least = least_node(&scene);
+    if least < tree.least {
+        tree.least = least;
+        (bounds, after) = tree.refit(level, levels);
+    }
+    debug_assert!(Lattice::pad(&bounds) == scene, "the box of all triangles changed");
     (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
     if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
@@ -140,8 +143,19 @@ struct Tree<'b> {
     least: f32,
 }
 
+impl Tree<'_> {
+    /// Writes the boxes of all nodes, of which there are so many levels; returns the root's and the SAH cost.
+    fn refit(&mut self, level: SimdLevel, levels: u32) -> (Aabb, f64) {
+        if levels <= FEW_LEVELS {
+            dispatch(level, Refit::<{ FEW_LEVELS as usize }>(self))
+        } else {
+            dispatch(level, Refit::<{ LEVELS as usize }>(self))
+        }
+    }
+}
+
 /// A tree of at most `N` levels that gets new boxes.
-struct Refit<'b, const N: usize>(Tree<'b>);
+struct Refit<'t, 'b, const N: usize>(&'t mut Tree<'b>);
 
 /// A node on the way down.
 #[derive(Clone, Copy)]
@@ -155,13 +169,13 @@ struct RefitNode {
     boxes: [[f32; 6]; WIDTH],
 }
 
-impl<const N: usize> Kernel for Refit<'_, N> {
+impl<const N: usize> Kernel for Refit<'_, '_, N> {
     type Output = (Aabb, f64);
 
-    /// Writes the boxes of all nodes; returns the root's and the SAH cost.
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self(Tree { mesh, ids, nodes, least }) = self;
+        let least = *least;
         let mut near = mesh.part_around(ids.first().copied().unwrap_or(0));
         let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [[0.0; 6]; WIDTH] }; N];
         let mut reader = mesh.reader();
