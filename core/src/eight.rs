@@ -1,13 +1,9 @@
-//! Eight triangles against one ray: the [`filter`](crate::filter) in eight lanes.
+//! Loads eight triangles, or eight rays, into vectors.
 //!
 //! ```text
 //! for each corner:  a row | x y z . | of each triangle, transposed:  x = | lane 0 | ... | lane 7 |
 //!                                                                    y, z likewise
 //! ```
-//!
-//! The lanes do the same operations in the same order as one triangle alone, none of them fused,
-//! so they drop the same triangles. Triangles that pass, about one a ray, are decided in f64 one
-//! by one.
 //!
 //! Rows are transposed in registers: a row that is copied through memory, or `map` over arrays of vectors, stores
 //! pieces, and the load of the whole waits for these stores.

@@ -1,8 +1,8 @@
 //! A conservative f32 filter in front of the f64 triangle test: Möller and Trumbore (1997) without
 //! a division, with a proven error bound.
 //!
-//! The same function tests one ray against eight triangles, eight rays against one triangle, and
-//! one ray against one triangle. All of them give the same bits.
+//! The same function tests one ray against eight triangles, eight rays against one triangle, and one ray against one
+//! triangle. All of them do the same operations in the same order, none of them fused, and give the same bits.
 //!
 //! ```text
 //! g = o - a    e = b - a    f = c - a    p = d x f    q = g x e
@@ -80,6 +80,8 @@ const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 const NEARBY_FLOOR: f32 = 2e-29;
 /// Shorter distances count as this one, so that no product on the way to the floor is denormal (slow).
 const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
+/// [`LEAST`].
+const NEARBY_UNDERFLOW: f32 = f32::from_bits(0x0380_0000); // 2^-120
 
 /// Directions that are longer or shorter are not scaled in f32.
 pub(crate) const NEARBY_LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
@@ -226,7 +228,7 @@ impl RayFilter {
         let slope = sum * (distance * 29.0 + extent * 19.0) * NEARBY_UNIT;
         let slope = if distance <= NEARBY_REACH { slope } else { f32::INFINITY };
         let distance = greater(distance, NEARBY_LEAST);
-        let floor = distance * (distance * NEARBY_FLOOR + f32::MIN_POSITIVE) + f32::MIN_POSITIVE;
+        let floor = distance * (distance * NEARBY_FLOOR + NEARBY_UNDERFLOW) + NEARBY_UNDERFLOW;
         Self { origin, direction, slope, floor }
     }
 
@@ -265,7 +267,7 @@ impl<S: Simd> LineFilter<f32x8<S>> {
         let is_in_range = distance.simd_le(NEARBY_REACH);
         let slope = is_in_range.select(slope, f32x8::splat(simd, f32::INFINITY));
         let distance = distance.greater(f32x8::splat(simd, NEARBY_LEAST));
-        let floor = distance * (distance * NEARBY_FLOOR + f32::MIN_POSITIVE) + f32::MIN_POSITIVE;
+        let floor = distance * (distance * NEARBY_FLOOR + NEARBY_UNDERFLOW) + NEARBY_UNDERFLOW;
         Self { origin, direction, slope, floor }
     }
 }
@@ -560,6 +562,20 @@ mod tests {
                 let mut triangle = unit;
                 triangle[at / 3][at % 3] = number;
                 assert!(beside.passes(&triangle), "{number} at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_computed_in_f32_are_no_less_than_those_in_f64() {
+        let direction = [1.0, 0.5, -1.9];
+        for distance in (-90..60).map(|power| 1.3 * 2.0_f32.powi(power)) {
+            for extent in [0.0, 1e-3, 1.0, 2.0].map(|part| part * distance) {
+                let reach = Reach { distance: distance.into(), extent: extent.into() };
+                let exact = RayFilter::new(direction, [0.0; 3], 0.0, reach);
+                let nearby = RayFilter::nearby([0.0; 3], direction, 3.4, distance, extent);
+                assert!(nearby.slope >= exact.slope, "{distance} {extent}");
+                assert!(nearby.floor >= exact.floor, "{distance} {extent}");
             }
         }
     }
