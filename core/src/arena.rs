@@ -133,6 +133,8 @@ pub(crate) fn split<T: FromBytes + Immutable>(bytes: &[u8], count: u64) -> Optio
 
 /// The bytes as elements, as many as fit whole; none if the bytes are not aligned for them.
 pub(crate) fn whole<T: FromBytes + IntoBytes>(bytes: &mut [u8]) -> &mut [T] {
+    let is_aligned = bytes.as_ptr().addr().is_multiple_of(align_of::<T>());
+    debug_assert!(bytes.len() < size_of::<T>() || is_aligned, "memory of a build is not aligned");
     <[T]>::mut_from_prefix(bytes).map_or(&mut [], |(elements, _)| elements)
 }
 
@@ -144,7 +146,7 @@ pub(crate) fn copy<T: Copy>(from: &[T], to: &mut [T]) {
     }
 }
 
-/// Moves elements to an earlier place, as `copy_within`, which can panic, does.
+/// Moves elements to an earlier place, like `copy_within`, but without code to panic.
 pub(crate) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
     debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
     for (at, to) in from.zip(to..) {

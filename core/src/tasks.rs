@@ -4,7 +4,7 @@
 //! the slot empty, and a task that was never run is still there at the end. [`Shared`] holds words that all
 //! tasks write, no two of them the same word.
 //!
-//! A processor without atomic operations has one core: there work is not cut.
+//! Without atomic operations work is not cut, nor on microcontrollers, to save flash.
 
 use core::ops::Range;
 #[cfg(target_has_atomic = "32")]
@@ -29,7 +29,7 @@ enum State<T, R> {
     Result(R),
 }
 
-/// Tasks that work is cut into, at most. A microcontroller has one core.
+/// Tasks that work is cut into, at most.
 pub(crate) const MOST: usize =
     if IS_SMALL || cfg!(not(target_has_atomic = "32")) { 1 } else { Control::MAX_TASKS as usize };
 
@@ -87,17 +87,18 @@ pub(crate) fn run<T: Send, R: Send>(
 #[inline(never)]
 pub(crate) fn run_several<T: Send, R: Send>(
     parallel: &Control<'_>,
-    tasks: impl Iterator<Item = T>,
+    mut tasks: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Sync,
     mut take: impl FnMut(R) -> Result<(), Error>,
 ) -> Result<(), Error> {
     // A loop: array functions write the code of a slot out for each of them.
     let mut slots = [const { Slot::new(State::Nothing) }; MOST];
     let mut count = 0;
-    for (slot, task) in slots.iter_mut().zip(tasks) {
+    for (slot, task) in slots.iter_mut().zip(&mut tasks) {
         *slot = Slot::new(State::Task(task));
         count += 1;
     }
+    debug_assert!(tasks.next().is_none(), "more tasks than slots");
     let is_broken = AtomicBool::new(false);
     let step = |index: u32| {
         let slot = slots.get(index as usize);

@@ -21,7 +21,7 @@
 //! too, if they do not fit into the index: an index of exact size has no room for keys of triangles that are
 //! skipped.
 //!
-//! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
+//! Each step but the last is cut into tasks: the passes by triangles, the roots by units. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
 //! side by side in the order of the bins.
 
@@ -401,9 +401,13 @@ impl Kernel for UnitsTask<'_> {
             last: RootRecord::new_zeroed(),
         };
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
+        let mut end = range.start;
         for unit in units.take_while(|unit| unit.start < range.end) {
+            debug_assert!(unit.start == end, "entries between units");
+            end = unit.end;
             roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
         }
+        debug_assert!(end == range.end, "the units of a task end elsewhere than its entries");
         let made = Made { first, child, nodes: roots.node_count, roots: roots.root_count };
         (made, roots.last)
     }
@@ -524,6 +528,7 @@ impl BuildInputs<'_> {
             }
             *slot = end;
         }
+        debug_assert!(end == entries, "the units end before the entries");
     }
 
     /// Builds the tree over the roots, behind their nodes, or in `spare` if the index has no room;

@@ -203,6 +203,8 @@ const WIDEST: usize = MAX_RESOLUTION as usize / WORD_BITS;
 
 /// Combines a row of bits with others by OR.
 fn or_row(any: &mut [u64; WIDEST], words: &[u64], bit: usize, width: usize) {
+    debug_assert!(width <= WIDEST * WORD_BITS, "a row with too many cells");
+    debug_assert!(bit + width <= words.len() * WORD_BITS, "a row behind the bits");
     for (word, from) in any.iter_mut().zip((0..width).step_by(WORD_BITS)) {
         *word |= load(words, bit + from) & low_bits(width - from);
     }

@@ -101,6 +101,7 @@ pub(crate) fn fill(
         end = end.wrapping_add(*slot);
         *slot = end;
     }
+    debug_assert!(end as usize == references.len(), "not as many references as were counted");
 
     // Put every primitive before the end of its lists, the last one first: lists ascend.
     PlacedBatch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {

@@ -239,9 +239,11 @@ fn run(
         list.or_bug("a list behind the references").unwrap_or_default()
     });
     let slot_count = plan.layout.hash_count;
+    debug_assert!(owners.len() == slot_count as usize, "a slot without an owner");
     for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
         watch.step(u32::try_from(slot).unwrap_or(u32::MAX), slot_count, [0.5, 1.0])?;
         let start = pool.offset()?;
+        debug_assert!(ids.is_empty() || owner != NOBODY, "a list of no cell");
         let cell = cell_of(owner, plan.lattice.resolution);
         let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
         let is_crowded = ids.len() > subdivide_above as usize;

@@ -186,8 +186,10 @@ impl Kernel for ItemsTask<'_> {
         let mut bounds = Aabb::EMPTY;
         let mut count = 0;
         let triangles = first..first + items.len() as u32;
+        let mut left = items.len();
         for piece in mesh.pieces(triangles) {
             for (triangle, corners) in piece.each() {
+                left = left.wrapping_sub(1);
                 let Some(box_of) = finite_box(triangle, corners, flags)? else { continue };
                 bounds = bounds.union(&box_of);
                 // Turn -0 into 0, so that the order of a union does not matter.
@@ -199,6 +201,7 @@ impl Kernel for ItemsTask<'_> {
                 count += 1;
             }
         }
+        debug_assert!(left == 0, "a part of the mesh has other triangles than were asked for");
         Ok((count, bounds))
     }
 }
@@ -421,6 +424,8 @@ fn gather(
             levels = levels.max(most);
         }
     }
+    let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
+    debug_assert!(cursor.next(top).is_none(), "a range that no task made");
     (count, levels)
 }
 
