@@ -16,6 +16,7 @@ mod range;
 mod refit;
 mod scans;
 mod scene_batches;
+mod scene_builds;
 mod scene_surfaces;
 mod scenes;
 mod snapped;

@@ -561,38 +561,13 @@ fn moved_instances_are_found_after_a_refit() {
         let anew = Built::scene(&second, objects, &Config::default()).unwrap();
         let scene = built.open(objects).unwrap();
         scene.validate(&mut vec![0; scene.validate_bytes()]).unwrap();
-        let mut random = Random(3);
+        let (mut random, mut hits) = (Random(3), 0);
         for round in 0..200 {
             let ray = ray(&mut random, round, 10.0);
-            assert_eq!(scene.intersect(&ray), anew.open(objects).unwrap().intersect(&ray));
+            let hit = scene.intersect(&ray);
+            assert_eq!(hit, anew.open(objects).unwrap().intersect(&ray));
+            hits += usize::from(hit.is_some());
         }
-    });
-}
-
-#[test]
-fn tasks_and_places_in_memory_do_not_change_a_scene() {
-    with_grids(|objects, _| {
-        let instances = scattered(300, 3, 10.0, 4);
-        let config = Config::default();
-        let one = Built::scene(&instances, objects, &config).unwrap();
-        let scene = one.open(objects).unwrap();
-        // Exactly as much memory as is needed.
-        let mut exact = vec![Block::ZERO; Block::count_for(scene.blob().len())];
-        let sizes = Scene::bound(300, &config).unwrap();
-        let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-        let again = Scene::build(
-            &instances,
-            objects,
-            &config,
-            Block::bytes_mut(&mut exact),
-            Block::bytes_mut(&mut scratch),
-        )
-        .unwrap();
-        assert!(again.blob() == scene.blob());
-        let grid: &Grid<'_> = match &objects[0] {
-            Object::Grid(grid) => grid,
-            _ => panic!("a grid"),
-        };
-        assert!(Scene::open(grid.blob(), objects).is_err());
+        assert!(hits > 20, "{hits}");
     });
 }
