@@ -86,7 +86,7 @@ fn face(words: &str, vertices: usize, corners: &mut Vec<u32>) -> Result<()> {
     Ok(())
 }
 
-/// The lines of a file, and the number of the last one.
+/// The lines of a file, which end as those of Unix, Windows or old Macs do, and the number of the last one.
 struct Lines<'a> {
     rest: &'a [u8],
     number: usize,
@@ -100,10 +100,12 @@ impl<'a> Iterator for Lines<'a> {
             return None;
         }
         self.number += 1;
-        let end = self.rest.iter().position(|&byte| byte == b'\n').unwrap_or(self.rest.len());
+        let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
+        let end = self.rest.iter().position(is_end).unwrap_or(self.rest.len());
         let (line, rest) = self.rest.split_at(end);
-        self.rest = rest.get(1..).unwrap_or_default();
-        Some(line.strip_suffix(b"\r").unwrap_or(line))
+        let behind = if rest.starts_with(b"\r\n") { 2 } else { 1 };
+        self.rest = rest.get(behind..).unwrap_or_default();
+        Some(line)
     }
 }
 
@@ -145,6 +147,18 @@ mod tests {
         let mesh = read(text).unwrap();
         assert_eq!((mesh.positions.len(), &*mesh.indices), (3, &[[0, 1, 2]][..]));
         assert_eq!(read(&[b"\xef\xbb\xbf", &text[..]].concat()).unwrap(), mesh);
+    }
+
+    #[test]
+    fn lines_may_end_as_on_any_system() {
+        let text = "v 0 0 0\nv 1 0 0\n\nv 0 1 0\nf 1 \\\n2 3\n";
+        let mesh = read(text.as_bytes()).unwrap();
+        assert_eq!(mesh.indices, [[0, 1, 2]]);
+        for end in ["\r", "\r\n"] {
+            assert_eq!(read(text.replace('\n', end).as_bytes()).unwrap(), mesh, "{end:?}");
+            let wrong = format!("{text}f 1 2 4\n").replace('\n', end);
+            assert_eq!(message(wrong.as_bytes()), "line 7: there is no vertex 4, the file has 3");
+        }
     }
 
     #[test]
