@@ -162,7 +162,7 @@
  * ------
  * Every call that can fail returns an hgrid_status: HGRID_OK, which is 0, or a negative number that
  * is never used for anything else. hgrid_status_string says in words what to do. Details (how many
- * bytes, which triangle) are in the report. A miss is not an error. Odd meshes are none either: an
+ * bytes, which triangle) are in the report. A miss is not an error. Nor are odd meshes: an
  * empty mesh builds and is never hit, and a triangle with a NaN or infinite vertex is left out and
  * counted, unless HGRID_BUILD_STRICT says otherwise.
  *
@@ -350,8 +350,7 @@
 #define HGRID_METHOD_RECURSIVE 4
 
 /**
- * A bounding volume hierarchy over a grid of the triangles' centres: each triangle lies in one leaf, and a node has
- * up to eight children with tight boxes.
+ * A bounding volume hierarchy: each triangle lies in one leaf, and a node has up to eight children with tight boxes.
  *
  * It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
  * belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
@@ -557,7 +556,7 @@ typedef void (*hgrid_task)(void *task_context, uint32_t index);
  * `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
  * `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
  *
- * Each macro sets all fields to the values that the method's authors use. To change the method later,
+ * Each macro sets all fields to the paper's values, and to ours where it names none. To change the method later,
  * set `method` and `density`: fields of other methods are ignored.
  */
 typedef struct hgrid_config {
@@ -1050,7 +1049,8 @@ typedef struct hgrid_blob_info {
      */
     uint32_t has_mesh;
     /**
-     * Vertices of its mesh; twice the number of shapes or instances.
+     * Vertices of its mesh; twice the number of shapes or instances; of a packed scene, the objects that its views
+     * hold.
      */
     uint64_t vertex_count;
     /**
@@ -1179,7 +1179,7 @@ typedef struct hgrid_boxes {
      * hit.
      *
      * `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
-     * NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
+     * NaN, is no hit. The test is called on the calling thread, for shapes whose box the ray meets and perhaps some
      * others, roughly front to back, and for each shape at most once for each ray. It may query this
      * tree and others, and must not be left by `longjmp` or by a C++ exception.
      */
@@ -1469,10 +1469,10 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
- * and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
- * configuration is not 0; or, from `hgrid_join`, the size puts the next mesh at an address that is not aligned. The
- * usual cause is a struct that was not initialised with its `_INIT` macro.
+ * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct and what is behind the
+ * known fields is not zero; or the `reserved` field of a struct that the call reads is not 0; or, from `hgrid_join`,
+ * the size puts the next mesh at an address that is not aligned. The usual cause is a struct that was not initialised
+ * with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 
@@ -1518,7 +1518,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_INDICES -21
 
 /**
- * The mesh's `index_type` is none that this version knows.
+ * The mesh's `index_type` is unknown to this version.
  */
 #define HGRID_ERROR_INVALID_INDEX_TYPE -22
 
@@ -1551,7 +1551,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_PARTS -27
 
 /**
- * The configuration's `method` is none that this version knows, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
+ * The configuration's `method` is unknown to this version, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
  */
 #define HGRID_ERROR_INVALID_METHOD -30
 
@@ -1594,7 +1594,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_METHOD_LEFT_OUT -38
 
 /**
- * The configuration's `quality` is none that this version knows, and the method is `HGRID_METHOD_BVH`.
+ * The configuration's `quality` is unknown to this version, and the method is `HGRID_METHOD_BVH`.
  */
 #define HGRID_ERROR_INVALID_QUALITY -39
 
@@ -1661,12 +1661,12 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_ANSWERS -51
 
 /**
- * The coherence is none that this version knows.
+ * The coherence is unknown to this version.
  */
 #define HGRID_ERROR_INVALID_COHERENCE -52
 
 /**
- * The options' `cull` is none that this version knows.
+ * The options' `cull` is unknown to this version.
  */
 #define HGRID_ERROR_INVALID_CULL -53
 
@@ -1963,7 +1963,7 @@ bool hgrid_intersect(const struct hgrid_grid *grid,
                      struct hgrid_hit *hit);
 
 /**
- * Tells whether a ray hits anything: what `hgrid_intersect` would return, but sooner.
+ * Tells whether a ray hits anything: what `hgrid_intersect` would return, but faster.
  *
  * This is the query for shadows and visibility. It stops at the first triangle it finds in the
  * ray's range, which need not be the closest.
@@ -2081,10 +2081,9 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * Tells where a ray met the mesh, which way the triangle faces there, and where rays start that leave
  * it.
  *
- * `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
- * rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
- * triangle (as that of a miss), the ray has no direction, the view is one of zeros, or a pointer is
- * NULL, which none may be. Takes about as long as a triangle test in `double`.
+ * `hit` is what a query has found for `ray`, of which the direction tells the side. Returns true and writes `surface`;
+ * or returns false and writes nothing: the hit names no triangle (as that of a miss), the ray has no direction, the
+ * view is one of zeros, or a pointer is NULL, which none may be. Takes about as long as a triangle test in `double`.
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
  * `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
@@ -2149,7 +2148,7 @@ bool hgrid_locate(const struct hgrid_grid *grid,
 
 /**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
- * each, bit for bit, but sooner.
+ * each, bit for bit, but faster.
  *
  * A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of
  * `hits`. A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to
@@ -2219,7 +2218,7 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
 
 /**
  * Tells for each of many rays whether it hits anything: what `hgrid_occluded` would say for each,
- * but sooner.
+ * but faster.
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
  * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
@@ -2258,7 +2257,7 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
                               const struct hgrid_query_options *options);
 
 /**
- * Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but sooner.
+ * Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but faster.
  *
  * Writes a `uint32_t` for each ray, a triangle or `HGRID_INVALID_ID`, every `occluder_stride` bytes
  * from `occluders` on. It is `HGRID_INVALID_ID` where `hgrid_occluded_n` writes 0. Where several
@@ -2282,12 +2281,11 @@ hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
 /**
  * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
  *
- * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
- * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
- * `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
- * mesh is the one it was built for, of which only the counts are compared. A blob that
- * `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
- * masks included, and the one in the blob is not looked at.
+ * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory, in a mapped file, in
+ * flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`; bytes behind it are ignored. It
+ * says itself which method built it and how. The mesh is the one it was built for, of which only the counts are
+ * compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. If you pass a mesh, it
+ * replaces the one in the blob, masks included.
  *
  * The call does not check the whole blob. On damaged bytes queries may answer wrongly, but they end, and
  * they read nothing outside the blob and the mesh. `hgrid_validate` proves a blob. The bytes must not
@@ -2407,8 +2405,9 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that
- * was just built needs no proof; a blob from a file, a network or another process may.
+ * Takes a small multiple of the time of a build. On damaged bytes a grid of another method than `HGRID_METHOD_BVH` may
+ * take much longer, within docs/bounds.md. A grid that was just built needs no proof; a blob from a file, a network or
+ * another process may.
  *
  * A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
  * and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
@@ -2427,8 +2426,8 @@ hgrid_status hgrid_validate(const struct hgrid_grid *grid,
                             size_t scratch_bytes);
 
 /**
- * Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree one byte for eight
- * triangles.
+ * Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree a bit for each
+ * triangle, rounded up to four bytes.
  *
  * 0 also for NULL and for a view of zeros (`HGRID_GRID_INIT`).
  *
@@ -2553,7 +2552,7 @@ bool hgrid_intersect_shapes(const struct hgrid_shapes *shapes,
                             struct hgrid_hit *hit);
 
 /**
- * Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but sooner.
+ * Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but faster.
  *
  * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
  *
@@ -2606,7 +2605,7 @@ hgrid_status hgrid_intersect_shapes_n(const struct hgrid_shapes *shapes,
                                       const struct hgrid_query_options *options);
 
 /**
- * Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
+ * Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but faster.
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on.
  * All else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may
@@ -2776,7 +2775,7 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
  *
  * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of
  * this call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The call
- * copies everything, and compares every two objects.
+ * copies everything, and compares each object with every other.
  *
  * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
  * cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
@@ -2838,7 +2837,7 @@ bool hgrid_intersect_scene(const struct hgrid_scene *scene,
                            struct hgrid_scene_hit *hit);
 
 /**
- * Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but sooner.
+ * Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but faster.
  *
  * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
  *
@@ -2852,7 +2851,7 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
  * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
  * that it shows.
  *
- * For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob.
+ * Of a scene that was opened with objects of yours these are yours; of a packed scene they lie in its blob.
  * The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
  * `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
  * `hit` is NULL, or the hit names nothing in the scene.
@@ -2971,7 +2970,7 @@ hgrid_status hgrid_intersect_scene_n(const struct hgrid_scene *scene,
 
 /**
  * Tells for each of many rays whether it hits anything in a scene: what `hgrid_occluded_scene` would say for
- * each, but sooner.
+ * each, but faster.
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from
  * `occluded` on. All else is as with `hgrid_intersect_scene_n`. `rays` and `occluded` may be NULL if `count` is

@@ -87,7 +87,7 @@ namespace hgrid {
 inline namespace cpp14 {
 #endif
 
-// --- words ----------------------------------------------------------------------------------------
+// --- types ----------------------------------------------------------------------------------------
 
 /// A ray, or the part of it from `t_min` to `t_max`. See `hgrid_ray`.
 using ray = ::hgrid_ray;
@@ -107,7 +107,7 @@ using surface = ::hgrid_surface;
 using scene_surface = ::hgrid_scene_surface;
 /// The report of a build. See `hgrid_report`.
 struct report : ::hgrid_report {
-    /// One before its call.
+    /// An empty report.
     report() noexcept : ::hgrid_report HGRID_REPORT_INIT {}
     /// One that a call in C has filled.
     report(const ::hgrid_report &raw) noexcept : ::hgrid_report(raw) {}
@@ -292,7 +292,7 @@ enum class coherence : std::uint32_t {
     coherent = HGRID_COHERENCE_COHERENT,
 };
 
-/// The time that a build of `method::bvh` takes for rays that are faster.
+/// How much time a build of `method::bvh` spends on faster rays.
 enum class quality : std::uint32_t {
     /// The shortest build: `HGRID_QUALITY_FAST`
     fast = HGRID_QUALITY_FAST,
@@ -341,7 +341,7 @@ inline constexpr ray_f64 make_ray_f64(const std::array<double, 3> &origin, const
             0};
 }
 
-/// Returns true if the library that is linked has the version of this header, but for repairs.
+/// Returns true if the library that is linked has the version of this header, up to the patch number.
 inline bool is_compatible() noexcept
 {
     return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
@@ -906,7 +906,7 @@ public:
     }
     /// Levels of grids. For recursive.
     config &depth(std::uint32_t levels) noexcept { return raw_.depth = levels, *this; }
-    /// The time that the build takes for rays that are faster. For bvh.
+    /// How much time the build spends on faster rays. For bvh.
     config &quality(hgrid::quality of) noexcept
     {
         return raw_.quality = static_cast<std::uint32_t>(of), *this;
@@ -1493,13 +1493,13 @@ public:
         return opened ? result<grid>(grid(*opened, std::move(blob))) : opened.error();
     }
 
-    /// Takes the other grid, which is none then.
+    /// Takes the other grid, which is empty afterwards.
     grid(grid &&other) noexcept
         : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_)),
           kept_(std::move(other.kept_))
     {
     }
-    /// Frees its own memory and takes the other grid, which is none then.
+    /// Frees its own memory and takes the other grid, which is empty afterwards.
     grid &operator=(grid &&other) noexcept
     {
         static_cast<view &>(*this) = std::exchange(static_cast<view &>(other), view());
@@ -1588,7 +1588,7 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
     report own;
     report &found = details != nullptr ? *details : own;
 
-    // There may be two attempts; who watches sees one.
+    // There may be two attempts, which progress reports as one.
     float shown = -1;
     auto forward = [&](float done) {
         return done <= shown || (shown = done, how.progress_(how.progress_object_, done));

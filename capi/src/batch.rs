@@ -9,7 +9,7 @@ use crate::status::{HGRID_OK, hgrid_status};
 use crate::types::hgrid_grid;
 
 /// Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
-/// each, bit for bit, but sooner.
+/// each, bit for bit, but faster.
 ///
 /// A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of
 /// `hits`. A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn hgrid_intersect_n(
 }
 
 /// Tells for each of many rays whether it hits anything: what `hgrid_occluded` would say for each,
-/// but sooner.
+/// but faster.
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
 /// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn hgrid_occluded_n(
     call().err().unwrap_or(HGRID_OK)
 }
 
-/// Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but sooner.
+/// Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but faster.
 ///
 /// Writes a `uint32_t` for each ray, a triangle or `HGRID_INVALID_ID`, every `occluder_stride` bytes
 /// from `occluders` on. It is `HGRID_INVALID_ID` where `hgrid_occluded_n` writes 0. Where several

@@ -15,12 +15,11 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 
 /// Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
 ///
-/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
-/// in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
-/// `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
-/// mesh is the one it was built for, of which only the counts are compared. A blob that
-/// `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
-/// masks included, and the one in the blob is not looked at.
+/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory, in a mapped file, in
+/// flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`; bytes behind it are ignored. It
+/// says itself which method built it and how. The mesh is the one it was built for, of which only the counts are
+/// compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. If you pass a mesh, it
+/// replaces the one in the blob, masks included.
 ///
 /// The call does not check the whole blob. On damaged bytes queries may answer wrongly, but they end, and
 /// they read nothing outside the blob and the mesh. `hgrid_validate` proves a blob. The bytes must not
@@ -217,8 +216,9 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that
-/// was just built needs no proof; a blob from a file, a network or another process may.
+/// Takes a small multiple of the time of a build. On damaged bytes a grid of another method than `HGRID_METHOD_BVH` may
+/// take much longer, within docs/bounds.md. A grid that was just built needs no proof; a blob from a file, a network or
+/// another process may.
 ///
 /// A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
 /// and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
@@ -249,8 +249,8 @@ pub unsafe extern "C" fn hgrid_validate(
     proof.err().unwrap_or(HGRID_OK)
 }
 
-/// Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree one byte for eight
-/// triangles.
+/// Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree a bit for each
+/// triangle, rounded up to four bytes.
 ///
 /// 0 also for NULL and for a view of zeros (`HGRID_GRID_INIT`).
 ///

@@ -45,7 +45,8 @@ pub struct hgrid_blob_info {
     pub method: u32,
     /// 1 if the mesh is in it, as `hgrid_pack` writes it, or all that a scene shows; 0 if not.
     pub has_mesh: u32,
-    /// Vertices of its mesh; twice the number of shapes or instances.
+    /// Vertices of its mesh; twice the number of shapes or instances; of a packed scene, the objects that its views
+    /// hold.
     pub vertex_count: u64,
     /// Triangles of its mesh; shapes or instances; grids and scenes that a packed scene shows.
     pub triangle_count: u64,

@@ -51,7 +51,7 @@ pub unsafe extern "C" fn hgrid_intersect(
     true
 }
 
-/// Tells whether a ray hits anything: what `hgrid_intersect` would return, but sooner.
+/// Tells whether a ray hits anything: what `hgrid_intersect` would return, but faster.
 ///
 /// This is the query for shadows and visibility. It stops at the first triangle it finds in the
 /// ray's range, which need not be the closest.
@@ -217,10 +217,9 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// Tells where a ray met the mesh, which way the triangle faces there, and where rays start that leave
 /// it.
 ///
-/// `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
-/// rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
-/// triangle (as that of a miss), the ray has no direction, the view is one of zeros, or a pointer is
-/// NULL, which none may be. Takes about as long as a triangle test in `double`.
+/// `hit` is what a query has found for `ray`, of which the direction tells the side. Returns true and writes `surface`;
+/// or returns false and writes nothing: the hit names no triangle (as that of a miss), the ray has no direction, the
+/// view is one of zeros, or a pointer is NULL, which none may be. Takes about as long as a triangle test in `double`.
 ///
 /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
 /// `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need

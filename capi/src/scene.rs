@@ -436,7 +436,7 @@ pub unsafe extern "C" fn hgrid_validate_scene(
 ///
 /// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of
 /// this call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The call
-/// copies everything, and compares every two objects.
+/// copies everything, and compares each object with every other.
 ///
 /// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
 /// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
@@ -534,7 +534,7 @@ pub unsafe extern "C" fn hgrid_intersect_scene(
     true
 }
 
-/// Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but sooner.
+/// Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but faster.
 ///
 /// `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
 ///
@@ -555,7 +555,7 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
 /// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
 /// that it shows.
 ///
-/// For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob.
+/// Of a scene that was opened with objects of yours these are yours; of a packed scene they lie in its blob.
 /// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
 /// `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
 /// `hit` is NULL, or the hit names nothing in the scene.

@@ -78,7 +78,7 @@ pub unsafe extern "C" fn hgrid_intersect_scene_n(
 }
 
 /// Tells for each of many rays whether it hits anything in a scene: what `hgrid_occluded_scene` would say for
-/// each, but sooner.
+/// each, but faster.
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from
 /// `occluded` on. All else is as with `hgrid_intersect_scene_n`. `rays` and `occluded` may be NULL if `count` is

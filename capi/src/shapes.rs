@@ -52,7 +52,7 @@ pub struct hgrid_boxes {
     /// hit.
     ///
     /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
-    /// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
+    /// NaN, is no hit. The test is called on the calling thread, for shapes whose box the ray meets and perhaps some
     /// others, roughly front to back, and for each shape at most once for each ray. It may query this
     /// tree and others, and must not be left by `longjmp` or by a C++ exception.
     pub test: Option<
@@ -248,7 +248,7 @@ pub unsafe extern "C" fn hgrid_intersect_shapes(
     true
 }
 
-/// Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but sooner.
+/// Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but faster.
 ///
 /// `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
 ///
@@ -326,7 +326,7 @@ pub unsafe extern "C" fn hgrid_intersect_shapes_n(
     call().err().unwrap_or(HGRID_OK)
 }
 
-/// Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
+/// Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but faster.
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on.
 /// All else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may

@@ -16,10 +16,10 @@ pub const HGRID_OK: hgrid_status = 0;
 /// A pointer is NULL that may not be.
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
-/// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
-/// and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
-/// configuration is not 0; or, from `hgrid_join`, the size puts the next mesh at an address that is not aligned. The
-/// usual cause is a struct that was not initialised with its `_INIT` macro.
+/// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct and what is behind the
+/// known fields is not zero; or the `reserved` field of a struct that the call reads is not 0; or, from `hgrid_join`,
+/// the size puts the next mesh at an address that is not aligned. The usual cause is a struct that was not initialised
+/// with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch, the blob or the room for one does not start at a multiple of
@@ -49,7 +49,7 @@ pub const HGRID_ERROR_INVALID_POSITIONS: hgrid_status = -20;
 /// The index stride is below three indices, or the indices do not fit into memory.
 pub const HGRID_ERROR_INVALID_INDICES: hgrid_status = -21;
 
-/// The mesh's `index_type` is none that this version knows.
+/// The mesh's `index_type` is unknown to this version.
 pub const HGRID_ERROR_INVALID_INDEX_TYPE: hgrid_status = -22;
 
 /// There are more triangles, boxes or instances than the method takes, 2^31 for a tree and 4294967294 for the others;
@@ -70,7 +70,7 @@ pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
 /// arrays, too; or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
 pub const HGRID_ERROR_INVALID_PARTS: hgrid_status = -27;
 
-/// The configuration's `method` is none that this version knows, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
+/// The configuration's `method` is unknown to this version, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
 pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
 
 /// The density is NaN, infinite or not above 0, or asks for too much: more than 4096 cells on an
@@ -99,7 +99,7 @@ pub const HGRID_ERROR_CANCELLED: hgrid_status = -37;
 /// `hgrid_has_method` tells which are.
 pub const HGRID_ERROR_METHOD_LEFT_OUT: hgrid_status = -38;
 
-/// The configuration's `quality` is none that this version knows, and the method is `HGRID_METHOD_BVH`.
+/// The configuration's `quality` is unknown to this version, and the method is `HGRID_METHOD_BVH`.
 pub const HGRID_ERROR_INVALID_QUALITY: hgrid_status = -39;
 
 /// The bytes, or the view, are not a grid.
@@ -140,10 +140,10 @@ pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
 /// The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
 pub const HGRID_ERROR_INVALID_ANSWERS: hgrid_status = -51;
 
-/// The coherence is none that this version knows.
+/// The coherence is unknown to this version.
 pub const HGRID_ERROR_INVALID_COHERENCE: hgrid_status = -52;
 
-/// The options' `cull` is none that this version knows.
+/// The options' `cull` is unknown to this version.
 pub const HGRID_ERROR_INVALID_CULL: hgrid_status = -53;
 
 /// An instance names an object that does not exist. The report's `triangle` is the number of the instance.

@@ -72,8 +72,7 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// GiB: ask with scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
-/// A bounding volume hierarchy over a grid of the triangles' centres: each triangle lies in one leaf, and a node has
-/// up to eight children with tight boxes.
+/// A bounding volume hierarchy: each triangle lies in one leaf, and a node has up to eight children with tight boxes.
 ///
 /// It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
 /// belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
@@ -177,7 +176,7 @@ pub struct hgrid_part {
 /// `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
 /// `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
 ///
-/// Each macro sets all fields to the values that the method's authors use. To change the method later,
+/// Each macro sets all fields to the paper's values, and to ours where it names none. To change the method later,
 /// set `method` and `density`: fields of other methods are ignored.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]

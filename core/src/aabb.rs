@@ -69,13 +69,13 @@ impl Aabb {
     }
 }
 
-/// The lesser of two numbers that are no NaN, in one instruction.
+/// The lesser of two numbers, the second if one is NaN; in one instruction.
 #[inline(always)]
 pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers that are no NaN, in one instruction.
+/// The greater of two numbers, the second if one is NaN; in one instruction.
 #[inline(always)]
 pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }

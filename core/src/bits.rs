@@ -5,7 +5,7 @@ use crate::invariant::OrBug;
 /// Bits in a word.
 pub(crate) const WORD_BITS: usize = 64;
 
-/// Sets `bit` and the `more` bits behind it; bits past the end are dropped.
+/// Sets `bit` and the `more` bits behind it, which lie inside `words`.
 #[inline(always)]
 pub(crate) fn set_range(words: &mut [u64], bit: usize, more: usize) {
     let (mut word, mut shift, mut left) = (bit / WORD_BITS, bit % WORD_BITS, more);

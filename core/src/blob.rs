@@ -65,7 +65,7 @@ pub(crate) struct Header {
     pub(crate) reference_count: u32,
     /// Cells of a level in one of the level above, on each axis; 0 for a method without levels.
     pub(crate) macrocell_factor: u32,
-    /// A cell with more primitives has a subgrid; 0 for a method without subgrids.
+    /// A cell with more primitives has a subgrid if that separates them; 0 for a method without subgrids.
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,

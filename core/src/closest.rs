@@ -160,7 +160,7 @@ impl Grid<'_> {
             best.offer(id, point, &selection);
             best.distance
         };
-        if !self.approach(point, max_distance, test, &mut work) {
+        if !self.visit_nearest(point, max_distance, test, &mut work) {
             self.grow(point, &selection, &mut best, &mut work);
         }
         options.count(&work);

@@ -47,7 +47,7 @@ pub enum Parameters {
     Variable {
         /// Cells per primitive.
         density: f32,
-        /// A cell with more primitives than this gets a subgrid.
+        /// A cell with more primitives than this gets a subgrid, if that separates them.
         subdivide_above: u32,
     },
     /// Parameters of [`Method::Recursive`].
@@ -65,7 +65,7 @@ pub enum Parameters {
 }
 
 impl Parameters {
-    /// The paper's parameters for a method.
+    /// The default parameters of a method: those of the paper, and ours where it names none.
     #[must_use]
     pub const fn new(method: Method) -> Self {
         match method {
@@ -131,7 +131,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// The paper's parameters for a method.
+    /// The default parameters of a method: those of the paper, and ours where it names none.
     #[must_use]
     pub const fn new(method: Method) -> Self {
         Self { parameters: Parameters::new(method), flags: BuildFlags::empty() }

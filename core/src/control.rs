@@ -48,7 +48,7 @@ pub struct Control<'c> {
     /// returns when all calls have returned. A build calls it with counts from 2 to
     /// [`tasks`](Self::tasks), several times or, where the mesh or the scratch is small, never.
     ///
-    /// On targets without atomic operations it is never called.
+    /// On targets without atomic operations, and on microcontrollers, it is never called.
     pub run: &'c dyn for<'t> Fn(u32, &'t Task<'t>),
     /// Receives the part of the build that is done, from 0 to 1, and returns whether to go on. It is called on the
     /// thread that builds, with parts that grow from call to call. The last call of a build that succeeds has exactly

@@ -36,14 +36,14 @@ pub enum MeshField {
 pub enum BatchField {
     /// The rays.
     Rays,
-    /// The hits, or the bytes that tell what is occluded.
+    /// The hits, the bytes that tell what is occluded, or the ids of what blocks a ray.
     Answers,
 }
 
 /// The field of a [`Config`](crate::Config) that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigField {
-    /// Not a method of this version.
+    /// No method of this version; or, for shapes and scenes, another than [`Method::Bvh`](crate::Method::Bvh).
     Method,
     /// Zero, negative, NaN, or so large that an axis would need more than [`MAX_RESOLUTION`](limits::MAX_RESOLUTION)
     /// cells (1023 in a recursive grid), or ids and subgrids more than 8 GiB.
@@ -56,7 +56,7 @@ pub enum ConfigField {
     Flags,
 }
 
-/// The reason why a build or an open was refused. Nothing outside the caller's regions was touched.
+/// The reason why a call failed. Nothing outside the caller's regions was touched.
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Error {
@@ -238,7 +238,7 @@ impl fmt::Display for Error {
             Self::MethodRemoved => {
                 f.write_str("the grid was built with the method brick, which was removed: build it again")
             }
-            Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
+            Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method, or one without shapes and scenes"),
             Self::InvalidConfig(ConfigField::Density) => write!(
                 f,
                 "density must be above 0 and ask for at most {} cells on an axis, {} in a recursive \

@@ -132,7 +132,8 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
-    /// [`Error::Truncated`], [`Error::MeshMismatch`], [`Error::Corrupt`] and [`Error::MethodLeftOut`].
+    /// [`Error::Truncated`], [`Error::MeshMismatch`], [`Error::OtherContent`], [`Error::Corrupt`],
+    /// [`Error::MethodLeftOut`] and [`Error::MethodRemoved`].
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -159,7 +160,8 @@ impl<'a> Grid<'a> {
 
     /// Proves that the blob is a grid of the mesh, and so that every answer is right.
     ///
-    /// O(triangles + references) time. `scratch` is a bit for each triangle of a grid of [`Method::Bvh`]
+    /// O(cells + triangles + references) time; on damaged bytes, a grid of another method than [`Method::Bvh`] may take
+    /// longer (docs/bounds.md). `scratch` is a bit for each triangle of a grid of [`Method::Bvh`]
     /// ([`validate_bytes`](Self::validate_bytes)), nothing for the other methods; it need not be aligned. A grid that
     /// was just built needs no proof; one that came from a file, a network or another process may.
     ///
@@ -182,7 +184,8 @@ impl<'a> Grid<'a> {
         self.structure.validate(&header, &self.lattice, self.blob, &self.mesh, scratch)
     }
 
-    /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
+    /// Bytes of scratch that [`validate`](Self::validate) takes: of a tree a bit for each triangle, rounded up to four
+    /// bytes; of other methods 0.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
     pub const fn validate_bytes(&self) -> usize {
@@ -368,7 +371,7 @@ impl<'a> Grid<'a> {
 
     /// Passes `test` the triangles of a tree that may be within a distance of a point, about from near to far; returns
     /// false for the four grids. `test` returns the distance within which triangles matter from then on.
-    pub(crate) fn approach<T: Tally>(
+    pub(crate) fn visit_nearest<T: Tally>(
         &self,
         point: [f32; 3],
         within: f32,

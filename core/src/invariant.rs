@@ -1,4 +1,4 @@
-//! `or_bug`: states, beside an access of a builder, the invariant by which it finds something.
+//! `or_bug` marks an option that is `None` only if a builder has a bug, and names the broken invariant.
 
 /// An option that is never `None` where builders are right.
 pub(crate) trait OrBug {

@@ -7,7 +7,7 @@ pub const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
 /// extent of a box, its cells and the distances along a ray all stay far from overflow.
 pub const MAX_COORDINATE: f32 = f32::from_bits(0x7b80_0000); // 2^120, about 1.3e36
 
-/// The most cells on an axis. f32 positions keep 11 bits for the place inside a cell.
+/// The most cells on an axis. f32 positions keep 12 bits for the place inside a cell.
 pub const MAX_RESOLUTION: u32 = 4096;
 
 /// The most cells of a recursive grid on an axis: three such numbers share a word.

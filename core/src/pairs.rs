@@ -25,7 +25,7 @@ pub(crate) struct Decided {
     pub(crate) hits: u32,
     /// Lanes that have to be decided alone.
     pub(crate) unsure: u32,
-    /// Lanes with a hit whose ray comes from the triangle's front.
+    /// Lanes whose ray comes from the triangle's front; without meaning where there is no hit.
     pub(crate) fronts: u32,
     t: [f32; LANES],
     u: [f32; LANES],

@@ -1,10 +1,10 @@
 //! Queries of one ray that take options.
 //!
-//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter gets the hits from
-//! near to far, and each triangle at most once. A grid finds hits in no exact order and repeats
-//! triangles, so a walk collects a few nearest hits in order and passes them to the filter. If the
-//! filter rejects them all, the next walk starts at the last of them. The first walk collects one
-//! hit, the next two, then four: a filter that accepts the first hit costs no further walk.
+//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter gets the hits from near to far, and
+//! each triangle at most once. A grid finds hits in no exact order and repeats triangles, so a walk collects a few
+//! nearest hits in order and passes them to the filter. If the filter rejects them all, the next walk starts at the
+//! last of them. For a closest hit, the first walk collects one hit, the next two, then four: a filter that accepts the
+//! first hit costs no further walk.
 
 use crate::counters::Counters;
 use crate::grid::Grid;
@@ -138,11 +138,12 @@ impl Grid<'_> {
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
-    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there are. Without a filter, a
-    /// tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps the nearest in a heap, in time proportional
-    /// to the number of hits times the logarithm of the room. With a filter, and with the other methods if `hits` is
-    /// too short for all hits, the ray is traversed again for every sixteen hits, each time from the last of them. That
-    /// takes no memory, but the time for thousands of hits in one cell grows with the square of their number.
+    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there are. With empty `hits` it
+    /// only counts. Without a filter, a tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps the nearest
+    /// in a heap, in time proportional to the number of hits times the logarithm of the room. With a filter, and with
+    /// the other methods if `hits` is too short for all hits, the ray is traversed again for every sixteen hits, each
+    /// time from the last of them. That takes no memory, but the time for thousands of hits in one cell grows with the
+    /// square of their number.
     ///
     /// ```
     /// # use hgrid_core::*;

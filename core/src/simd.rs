@@ -1,4 +1,4 @@
-//! Chooses the vector instructions of queries: detects them once, and never uses more than the machine has.
+//! Chooses the vector instructions of builds and queries: detects them once, and never uses more than the machine has.
 //!
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once for each level that
 //! the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the one that was asked for, or the

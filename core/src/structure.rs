@@ -1,4 +1,6 @@
-//! The methods of the library: the only place that dispatches on the method.
+//! The methods of the library. Builds, opens, proofs and traversals are dispatched here; the header
+//! ([`blob`](crate::blob)), parameters ([`config`](crate::config)) and sizes ([`sizes`](crate::sizes)) have matches of
+//! their own.
 //!
 //! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
 //! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build`, which

@@ -1,6 +1,6 @@
-//! The only place where a caller's pointer becomes a reference or a value: here for builds
-//! and blobs, in `ask` for queries, in `join` for arrays of meshes, in `shapes` and `scene` for those.
-//! `batch_arrays` checks the addresses of a batch before it reads them.
+//! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in `ask` for
+//! queries, in `join` for arrays of meshes, in `shapes` and `scene` for those. (`create` reads the head of a region,
+//! which it wrote itself.) `batch_arrays` checks the addresses of a batch before it reads them.
 //!
 //! # The contract with C
 //!

@@ -34,9 +34,10 @@ use crate::simd::HAS_VECTORS;
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {
-    /// Nothing: random rays, rays after several bounces. A tree may sort them by origin and direction, in windows of as
-    /// many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the larger, the sooner the answers, up to millions
-    /// of rays. With less than 4 KiB it sorts windows of 256 rays on the stack. Other methods trace each ray alone.
+    /// Nothing is known about the rays: random ones, or those after several bounces. A tree may sort them by origin and
+    /// direction, in windows of as many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the larger, the sooner
+    /// the answers, up to millions of rays. With less than 4 KiB it sorts windows of 256 rays on the stack. Other
+    /// methods trace each ray alone.
     #[default]
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
-//! centre of the group. A distance is `side * inverse - origin * inverse`; the second product is computed once a ray.
+//! origin of the group's first ray. A distance is `side * inverse - origin * inverse`; the second product is computed
+//! once a ray.
 //!
 //! ```text
 //! relative to the distance   near: node's origin 1, sum 1, growth 1, product 1, sum 1, inverse 1    6 u

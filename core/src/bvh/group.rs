@@ -9,7 +9,7 @@
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
-//!       more than eight rays: intersect their beam with the eight boxes; it decides some for all rays
+//!       more than eight rays: intersect the beam of the whole group with the eight boxes; it decides some for all rays
 //!       then, whichever takes fewer vector tests:
 //!           ray by ray: each with all eight boxes
 //!           box by box: each that is undecided with sixteen rays at a time
@@ -44,12 +44,14 @@ const SCATTERED: f32 = 1.0 / 4.0;
 /// count as scattered sooner.
 const SCATTERED_IN_HUGE: f32 = 1.0 / 32.0;
 
-/// A tree of more bytes does not fit into the caches of one core. A scan of 110 000 triangles has such a tree.
+/// A tree of more bytes than this does not fit into the caches of one core. A scan of 110 000 triangles has such a
+/// tree.
 const CORE_CACHES: usize = 1 << 20;
-/// A tree of more bytes does not fit into the cache of all cores. A scan of 1.8 million triangles has such a tree.
+/// A tree of more bytes than this does not fit into the cache of all cores. A scan of 1.8 million triangles has such a
+/// tree.
 const SHARED_CACHE: usize = 16 << 20;
 
-/// Returns true if scattered rays would wait for memory at each step of a tree.
+/// Returns true if rays are scattered and would wait for memory at each step of a tree.
 fn wait_for_memory(rays: &Rays, bvh: &Bvh<'_>) -> bool {
     let part = if bvh.exceeds(SHARED_CACHE) { SCATTERED_IN_HUGE } else { SCATTERED };
     bvh.exceeds(CORE_CACHES) && rays.are_apart(part)
@@ -250,7 +252,7 @@ impl Met {
     ) {
         let count = mask.count_ones();
         let (mut some, mut all, mut enter) = (used, 0, f32x8::splat(simd, 0.0));
-        // Intersect the beam of more than a few rays with the boxes.
+        // For more than a few rays, intersect the beam of the whole group with the boxes.
         if count > FEW_RAYS {
             let beam = boxes.meet_beam(simd, beam);
             some &= beam.some;
@@ -321,7 +323,7 @@ fn one_by_one<S: Simd>(
     }
 }
 
-/// Intersects rays with the boxes of a node that their beam did not decide, box by box: sixteen rays at a time.
+/// Intersects rays with the boxes of a node that the beam did not decide, box by box: sixteen rays at a time.
 #[inline(always)]
 fn side_by_side<S: Simd>(
     simd: S,

@@ -1,8 +1,8 @@
 //! Keys of triangles: the Morton code of the cell in which the centre of the box lies.
 //!
-//! A cube around the centres is cut into 1024 cells an axis; the ten bits of each axis are interleaved,
-//! x highest. Sorted by key, triangles are in the order of a grid of grids of grids: cells that share
-//! their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
+//! A cube around the box of the mesh, or around the centres of a divided bin, is cut into 1024 cells an axis; the ten
+//! bits of each axis are interleaved, x highest. Sorted by key, triangles are in the order of a grid of grids of grids:
+//! cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};

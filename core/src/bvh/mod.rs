@@ -1,8 +1,9 @@
-//! A bounding volume hierarchy with eight children a node, built from a grid of the triangles' centres.
+//! A bounding volume hierarchy with eight children a node.
 //!
-//! Every triangle belongs to one cell of a grid, by its centre; crowded cells get a finer grid of their own. Cells in
-//! Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes of up to eight
-//! children in eight bits a side, a leaf up to eight ids; triangles stay in the caller's mesh.
+//! Quality `fast` builds it from a grid of the triangles' centres, quality `high` by SAH over single triangles
+//! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get a finer grid of their
+//! own. Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes
+//! of up to eight children in eight bits a side, a leaf up to eight ids; triangles stay in the caller's mesh.
 //!
 //! ```text
 //! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side |
@@ -25,13 +26,14 @@
 //! Terms of the build:
 //!
 //! - A *unit* is a group of bins that are cut into subtrees together ([`units`]).
-//! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own.
+//! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own. With more than
+//!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres.
 //! - A *root* is the top node of a subtree; the subtree itself is called so, too ([`roots`]).
 //! - A *seam* is a place between units where a task may end ([`units::is_seam`]).
 //!
-//! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011;
-//! nodes with quantised boxes, Ylitie et al. 2017. Departures: bins are sorted in cache, no level of the tree
-//! is bound to a level of the grid, and leaves hold ids, not triangles.
+//! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011; SAH in bins,
+//! Wald 2007; nodes with quantised boxes, Ylitie et al. 2017. Departures: bins are sorted in cache, no level of the
+//! tree is bound to a level of the grid, and leaves hold ids, not triangles.
 
 mod batch;
 mod bins;

@@ -6,7 +6,7 @@
 //! side of a box  = origin + bound * 2^(exponent - 127), on each axis
 //! child s is       an inner node   if bit s of inner is set: nodes[child + set bits below s]
 //!                  a leaf          if counts[s] > 0: ids[first + counts of the leaves before s ..]
-//!                  not there       otherwise; its box is inside out, so rays do not meet it
+//!                  not there       otherwise; its box is inside out, so that single rays do not meet it
 //! ```
 //!
 //! The quantised box holds the exact one and at least a sixty-fourth of a step more on each side. This margin absorbs

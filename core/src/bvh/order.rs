@@ -30,8 +30,7 @@ const DIGITS: usize = 1 << DIGIT_BITS;
 
 const _: () = assert!(3 + 3 * CELL_BITS + WITHIN_BITS == 2 * DIGIT_BITS);
 
-/// The scene is cut into 64 cells. Sorting pays if the cells in which rays start have at least this many rays
-/// on average.
+/// Sorting pays if the coarse cells in which rays start, four on each axis, have at least this many rays on average.
 const ENOUGH: usize = 2 * GROUP;
 
 /// The stride at which rays of a group are sampled to tell whether it is scattered. It is odd, so that rays which start
@@ -117,7 +116,7 @@ pub(crate) fn sort<'m>(
     Some(Sorted { order: sorted, waiting: spare })
 }
 
-/// Returns true if rays that follow one another start far from each other, in more than a few groups.
+/// Returns true if rays that follow one another start far from each other, in more than a quarter of the groups.
 fn are_scattered(batch: &impl Together, first: usize, count: usize, bounds: &Aabb) -> bool {
     let far = bounds.size().max_element() / 4.0;
     let (mut groups, mut scattered) = (0, 0);

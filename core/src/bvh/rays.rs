@@ -46,7 +46,7 @@ pub(crate) struct Rays {
     pub(crate) origin_error: f32,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
-    /// The point that boxes and origins are relative to.
+    /// The point that boxes and origins are relative to: the origin of the first ray that is not done.
     pub(crate) center: [f32; 3],
     /// 2^-21 of the largest coordinate of an origin relative to `center`: boxes grow by it, to cover eight roundings.
     spread: f32,
@@ -204,7 +204,7 @@ impl Rays {
         special
     }
 
-    /// Returns true if some origin lies farther from the centre than a part of the extent.
+    /// Returns true if some origin lies farther from that of the first ray than a part of the extent.
     pub(super) fn are_apart(&self, part: f32) -> bool {
         self.spread > part * (ROUNDINGS * self.extent)
     }

@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side that make up a root):
-//!     crowded: new keys in the box around its centres, new bins; then their units
-//!     else:    sort by key, split where high bits of the key change or in the middle, make a subtree of each part
+//!     too large to sort: new keys in the box around its centres, new bins; then their units
+//!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
 //! spare   | centres of a crowded unit, then second buffer of the sorts | untouched |
@@ -134,8 +134,10 @@ impl Roots<'_> {
         self.cut(range);
     }
 
-    /// Makes roots of sorted entries. Splits them where the highest bit changes in which their keys differ, or in the
-    /// middle if all are equal, until parts are small enough; none is smaller than a piece.
+    /// Makes roots of entries that are sorted by key; those of a unit that is still crowded after [`DIVISIONS`]
+    /// divisions are sorted by bin alone, which makes worse boxes. Splits them where the highest bit changes in which
+    /// their keys differ, or in the middle if all are equal, until parts are small enough; none is smaller than a
+    /// piece.
     fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {

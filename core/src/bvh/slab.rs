@@ -37,8 +37,8 @@ pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0
 /// The factor that widens far distances by their relative error: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
-/// The amount by which a ray starts earlier, relative to its start. It is more than [`WIDER`] moves a far side with a
-/// negative distance nearer.
+/// The amount by which a ray starts earlier, relative to its start. [`WIDER`] moves a far side nearer if its distance
+/// is negative; this is more than that.
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
 
 /// Returns the amount by which near sides are moved back where sides may lie behind the start: [`WIDER`] moves a far

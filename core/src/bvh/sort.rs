@@ -62,7 +62,7 @@ fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
     }
 }
 
-/// Sorts a few entries by all of their keys.
+/// Sorts a few entries by all bits of their keys.
 fn insert(entries: &mut [Entry]) {
     for at in 1..entries.len() {
         let mut hole = at;

@@ -63,7 +63,7 @@ pub(crate) struct Subtree {
 /// The rule by which ranges are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
-    /// Cuts between neighbours whose keys differ in the highest bits.
+    /// Between neighbours whose keys differ in the highest bits.
     Keys,
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
     Halves,

@@ -57,7 +57,7 @@ impl BlobInfo {
     ///
     /// # Errors
     /// [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
-    /// [`Error::Truncated`] if there are fewer bytes, [`Error::Corrupt`].
+    /// [`Error::Truncated`] if there are fewer bytes, [`Error::MethodRemoved`], [`Error::Corrupt`].
     ///
     /// ```
     #[doc = include_str!("../../doc/grid.txt")]

@@ -13,8 +13,8 @@
 //! grid. So a build may look at [`LOOKS`] cells for each triangle. A grid gets a share of those that are left, as
 //! large as its share of the references. A cell whose grid would take more stays a list.
 //!
-//! Resolution as in Manta: with n primitives at depth d of D, `m = (8 n)^(1 / (2 D + 1 - 2 d))` and
-//! `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
+//! Resolution as in Manta: with n primitives at depth d of D, `m = (density n)^(1 / (2 D + 1 - 2 d))` (by default 8 n)
+//! and `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
 
 use glam::Vec3A;
 

@@ -1,9 +1,13 @@
 //! The recursive grid that the paper compares with: Manta's (Bigler 2006; resolution after Ize,
-//! Shirley, Parker 2007), uncompressed, depth 3.
+//! Shirley, Parker 2007), uncompressed, by default of depth 3.
 //!
 //! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its own, around the part
-//! of the cell that they reach, until the depth is used up. Primitives are listed only in cells that they really
-//! overlap. The best traversal of the paper's methods, the longest build and several times the memory.
+//! of the cell that they reach, if the depth allows it, the grid separates them, and the budget of looks lasts
+//! ([`build`]). Of the four grids this one takes the fewest tests and steps a ray, the longest build and the most
+//! memory.
+//!
+//! Departures from Manta: the budget, a density that is halved where references exceed their limit, and margins that
+//! cover rounding.
 //!
 //! ```text
 //! blob | header | pool |

@@ -1,4 +1,7 @@
-//! Exact triangle-box overlap: the thirteen separating axes of Akenine-Möller (2001).
+//! Conservative triangle-box overlap in f32, after Akenine-Möller (2001).
+//!
+//! Departures: it tests ten of the thirteen axes, because the caller has compared the boxes, and it allows for
+//! rounding.
 //!
 //! Coordinates are in the root's cells, so that lengths are of the order of one at any scale of the scene. Scaling
 //! the axes does not change which triangles overlap which boxes.

@@ -1,8 +1,8 @@
 //! The multi-level variable hashed grid (CP10 §3.1): crowded cells hold grids of their own.
 //!
-//! The top is a one-level grid at density 4. A cell with more primitives than `subdivide_above` does not list them: it
-//! holds a subgrid, built by the same algorithm from the cell's primitives, cut to the part of the cell that they
-//! reach. Two levels, as in the paper.
+//! The top is a one-level grid, by default at density 4. A cell with more primitives than `subdivide_above` gets a
+//! subgrid if that separates them, and else keeps its list. The subgrid is built by the same algorithm from the cell's
+//! primitives, cut to the part of the cell that they reach. Two levels, as in the paper.
 //!
 //! ```text
 //! blob | header | row_offsets | domain_bits | hash | pool |
@@ -12,8 +12,8 @@
 //!   top bit set                     a subgrid, see subgrid.rs
 //! ```
 //!
-//! The paper names no threshold. 16 is the largest number that divides cells of every scan, with the tests per ray that
-//! the paper reports; on all scenes but bunny it delays a single picture (core/DESIGN.md).
+//! The paper names no threshold. 16 is the largest with which every scan gets subgrids. On all scenes but bunny, one
+//! picture takes longer with subgrids than without (docs/paper.md).
 
 mod build;
 mod subgrid;

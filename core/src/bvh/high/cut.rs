@@ -134,7 +134,7 @@ impl BinScale {
     }
 }
 
-/// The low bits of a number that was rounded.
+/// The bin of a place to which [`WHOLE_SHIFT`] was added.
 #[inline(always)]
 const fn bin(place: f32) -> usize {
     place.to_bits() as usize % MOST_BINS

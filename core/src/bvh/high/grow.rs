@@ -239,7 +239,9 @@ fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
     (middle, [Extent::of(simd, first), Extent::of(simd, second)])
 }
 
-/// Chooses the part to cut next.
+/// Chooses the part to cut next: of parts too large for a leaf the one with the largest surface, then of leaves the one
+/// with the largest surface times count; where parts are halved, the one with the most triangles. `None` if each has
+/// one.
 #[inline(always)]
 fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;
