@@ -4,6 +4,7 @@
 //! check   the mesh has the triangles of the tree; walking down from the root meets each node once
 //! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; unite those of
 //!         each leaf, the last of them repeated up to eight; quantise, hand the union of all to the parent
+//! again   if unused vertices widened the box of the scene so far that a node was too thin for it
 //! ```
 //!
 //! The check finds all errors, so nothing is written before an error. The boxes are those of a build with
@@ -19,7 +20,7 @@ use super::build::least_node;
 use super::node::{Child, LEAF, Node, Sides, WIDTH};
 use super::walk::{FEW_LEVELS, bytes};
 use super::{Bvh, LEVELS};
-use crate::aabb::Aabb;
+use crate::aabb::{Aabb, lesser};
 use crate::arena::split_mut;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
@@ -48,20 +49,20 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     });
     let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
     let mut tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
-    let (mut bounds, mut after) = tree.refit(level, levels);
-    let scene = Lattice::pad(&bounds);
-    // Vertices that no triangle uses count for nothing in a build. If they made the least step larger, start anew.
+    let mut refitted = tree.refit(level, levels);
+    let scene = Lattice::pad(&refitted.bounds);
+    // Vertices that no triangle uses count for nothing in a build. If they made a step larger, start anew.
     let least = least_node(&scene);
-    if least < tree.least {
+    if least < tree.least && refitted.thinnest < tree.least {
         tree.least = least;
-        (bounds, after) = tree.refit(level, levels);
+        refitted = tree.refit(level, levels);
     }
-    debug_assert!(Lattice::pad(&bounds) == scene, "the box of all triangles changed");
+    debug_assert!(Lattice::pad(&refitted.bounds) == scene, "the box of all triangles changed");
     (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
     if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
-    Ok([before, after])
+    Ok([before, refitted.cost])
 }
 
 impl Bvh<'_> {
@@ -143,9 +144,19 @@ struct Tree<'b> {
     least: f32,
 }
 
+/// The new boxes of a tree.
+struct Refitted {
+    /// The box of the root.
+    bounds: Aabb,
+    /// The SAH cost.
+    cost: f64,
+    /// The least extent of a node on any axis.
+    thinnest: f32,
+}
+
 impl Tree<'_> {
-    /// Writes the boxes of all nodes, of which there are so many levels; returns the root's and the SAH cost.
-    fn refit(&mut self, level: SimdLevel, levels: u32) -> (Aabb, f64) {
+    /// Writes the boxes of all nodes, of which there are so many levels.
+    fn refit(&mut self, level: SimdLevel, levels: u32) -> Refitted {
         if levels <= FEW_LEVELS {
             dispatch(level, Refit::<{ FEW_LEVELS as usize }>(self))
         } else {
@@ -157,20 +168,20 @@ impl Tree<'_> {
 /// A tree of at most `N` levels that gets new boxes.
 struct Refit<'t, 'b, const N: usize>(&'t mut Tree<'b>);
 
-/// A node on the way down.
+/// A node on the way down. Small numbers, as the stack holds one for each level.
 #[derive(Clone, Copy)]
 struct RefitNode {
     number: u32,
     /// Child nodes that have no box yet.
-    rest: u32,
+    rest: u8,
     /// The child node that is about to get its box.
-    slot: u32,
+    slot: u8,
     /// The boxes of child nodes: min, and max with other signs.
     boxes: [[f32; 6]; WIDTH],
 }
 
 impl<const N: usize> Kernel for Refit<'_, '_, N> {
-    type Output = (Aabb, f64);
+    type Output = Refitted;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
@@ -181,20 +192,22 @@ impl<const N: usize> Kernel for Refit<'_, '_, N> {
         let mut reader = mesh.reader();
         // The boxes of the triangles of a node.
         let mut boxes = [[f32::INFINITY; 8]; WIDTH * LEAF];
-        let mut cost = Cost::default();
+        let (mut cost, mut thinnest) = (Cost::default(), f32::INFINITY);
         let (mut depth, mut next) = (0, Some(0_u32));
         while let Some(level) = levels.get_mut(depth) {
             // Enter a node, then go down into those of its children that are nodes.
             if let Some(number) = next.take() {
                 let node = nodes.get(number as usize).or_bug("a child that is no node");
-                (level.number, level.rest) = (number, node.map_or(0, Node::inner));
+                let [inner, ..] = node.map_or(0, Node::inner).to_le_bytes();
+                (level.number, level.rest) = (number, inner);
             }
             let node = nodes.get_mut(level.number as usize).or_bug("a child that is no node");
             let Some(node) = node else { break };
             if level.rest != 0 {
-                level.slot = level.rest.trailing_zeros();
+                let slot = level.rest.trailing_zeros();
+                [level.slot, ..] = slot.to_le_bytes();
                 level.rest &= level.rest - 1;
-                if let Child::Inner(child) = node.child(level.slot) {
+                if let Child::Inner(child) = node.child(slot) {
                     next = Some(child);
                     depth += 1;
                 }
@@ -233,19 +246,20 @@ impl<const N: usize> Kernel for Refit<'_, '_, N> {
                 node.set_sides(simd, bounds, &children, used, least);
             }
             cost.add(simd, node, level.number == 0);
+            thinnest = lesser(thinnest, lesser(-(x + u), lesser(-(y + v), -(z + w))));
             let Some(above) = depth.checked_sub(1) else {
                 let bounds = Aabb { min: Vec3A::new(x, y, z), max: -Vec3A::new(u, v, w) };
-                return (bounds, cost.total());
+                return Refitted { bounds, cost: cost.total(), thinnest };
             };
             depth = above;
             if let Some(RefitNode { slot, boxes, .. }) = levels.get_mut(above)
-                && let Some(sides) = boxes.get_mut(*slot as usize)
+                && let Some(sides) = boxes.get_mut(usize::from(*slot))
             {
                 *sides = [x, y, z, u, v, w];
             }
         }
         debug_assert!(false, "the check did not walk the same way");
-        (Aabb::EMPTY, cost.total())
+        Refitted { bounds: Aabb::EMPTY, cost: cost.total(), thinnest }
     }
 }
 
