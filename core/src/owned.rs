@@ -268,7 +268,7 @@ impl OwnedGrid {
         let view = mesh.try_view()?;
         let mut sizes = sizes_with(&view, config, &mut [], control)?;
         let mut scratch = Memory::new(sizes.scratch_bytes, Region::Scratch)?;
-        // A tree's bound is two to three times what it takes, and only what it takes is touched. The bounds of other
+        // A tree's bound is about twice what it takes, and only what it takes is touched. The bounds of other
         // methods may exceed the memory: compute the exact size.
         if config.method() != Method::Bvh {
             sizes = sizes_with(&view, config, scratch.bytes_mut(), control)?;

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
-//! origin of the group's first ray. A distance is `side * inverse - origin * inverse`; the second product is computed
+//! origin of the first ray that is not done. A distance is `side * inverse - origin * inverse`; the second product is computed
 //! once a ray.
 //!
 //! ```text

@@ -33,9 +33,9 @@ use crate::ray::{Ray, RayF64, round};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Instance {
-    /// Rows of the matrix that takes the object's directions to the scene's. Mirrors, shears and scales of any kind are
-    /// allowed, as long as the matrix times its inverse in f32 is the identity to 2^-10: axis-aligned scales of any
-    /// ratio; with rotation or shear a condition number up to about 10^4.
+    /// Rows of the matrix that takes the object's directions to the scene's. It may mirror, shear and scale if the matrix
+    /// times its inverse, rounded to f32, differs from the identity by at most 2^-10. Scales along the axes may have any
+    /// ratio; a matrix that rotates or shears, too, may have a condition number up to about 10^4.
     pub linear: [[f32; 3]; 3],
     /// Number of the object among those of the scene.
     pub object: u32,
