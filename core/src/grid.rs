@@ -9,6 +9,7 @@ use crate::aabb::Aabb;
 use crate::approach::{Approach, LineF64};
 use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
+use crate::budget::Budget;
 use crate::cell::Lattice;
 use crate::config::Config;
 use crate::control::{Control, Watch};
@@ -298,11 +299,12 @@ impl<'a> Grid<'a> {
         tally: &mut T,
     ) {
         let mut limit = line.end;
-        // A ray meets every list at most once; damaged bytes may list everything in every cell.
-        let mut unread = self.structure.list_words();
+        // A ray meets every list at most once.
+        let mut budget = Budget::new(self.structure.list_words());
         let leaf = |references: &[u32], tally: &mut T| {
-            let Some(rest) = unread.checked_sub(references.len()) else { return f32::NEG_INFINITY };
-            unread = rest;
+            if !budget.take(references.len()) {
+                return f32::NEG_INFINITY;
+            }
             for &id in references {
                 tally.primitive_test();
                 let Some(triangle) = self.mesh.triangle(id) else { continue };

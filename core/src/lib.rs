@@ -31,7 +31,7 @@
 //! | layer | modules |
 //! |---|---|
 //! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
-//! | helpers | `invariant`, `simd`, `extremes`, `tasks`; `random` for tests |
+//! | helpers | `invariant`, `budget`, `simd`, `extremes`, `tasks`; `random` for tests |
 //! | memory | `arena`, `bits`, `lists`, `hash`, `survey`, `cell`, `blob`, `bump` |
 //! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |
@@ -89,6 +89,7 @@ mod arena;
 mod batch;
 mod bits;
 mod blob;
+mod budget;
 mod bump;
 #[cfg(feature = "bvh")]
 mod bvh;

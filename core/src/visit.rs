@@ -2,22 +2,21 @@
 //! without a ray, closest point and statistics.
 
 use crate::aabb::Aabb;
+use crate::budget::Budget;
 
 /// The box of all cells.
 pub(crate) const EVERYWHERE: Aabb =
     Aabb { min: glam::Vec3A::NEG_INFINITY, max: glam::Vec3A::INFINITY };
 
-/// A callback for lists of primitive ids, with a budget.
+/// A callback for lists of primitive ids, and how many words may still be read.
 pub(crate) struct Visitor<'v> {
-    /// Words that may still be read: damaged bytes may list everything in every cell.
-    rest: usize,
+    budget: Budget,
     leaf: &'v mut dyn FnMut(&[u32]),
 }
 
 impl<'v> Visitor<'v> {
-    /// A visitor with a budget of `words` words.
     pub(crate) fn new(words: usize, leaf: &'v mut dyn FnMut(&[u32])) -> Self {
-        Self { rest: words, leaf }
+        Self { budget: Budget::new(words), leaf }
     }
 
     /// Passes a list to the callback; `false` if the budget is used up.
@@ -30,8 +29,6 @@ impl<'v> Visitor<'v> {
 
     /// Takes words that lead to lists off the budget; `false` if it is used up.
     pub(crate) fn spend(&mut self, words: usize) -> bool {
-        let rest = self.rest.checked_sub(words);
-        self.rest = rest.unwrap_or(0);
-        rest.is_some()
+        self.budget.take(words)
     }
 }

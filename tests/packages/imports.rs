@@ -9,10 +9,19 @@ use hgrid_tests::artefact::root;
 /// Modules, and the modules that each imports.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
-/// Returns all sources in a folder.
-fn sources(dir: &Path) -> Vec<PathBuf> {
+/// The names of a path in core, from the root on.
+type Names = Vec<String>;
+
+/// A source file: the path of its module, and the paths that it names.
+struct Source {
+    module: Names,
+    named: Vec<Names>,
+}
+
+/// Returns all files in a folder.
+fn files(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").path());
-    entries.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] }).collect()
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
 /// Returns a source without comments and without the tests at its end.
@@ -22,21 +31,51 @@ fn code(source: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Returns the names that follow `crate::`, one or several in braces.
-fn names(code: &str) -> Vec<&str> {
+/// Returns the paths at the start of a text: one, or those of a list in braces. `prefix` stands before them.
+fn paths_at<'c>(text: &'c str, prefix: &[&'c str], found: &mut Vec<Names>) {
     let is_in_name = |c: char| c.is_alphanumeric() || c == '_';
-    let name = |text: &str| text.len() - text.trim_start_matches(is_in_name).len();
+    let text = text.trim_start();
+    let (name, behind) = text.split_at(text.find(|c| !is_in_name(c)).unwrap_or(text.len()));
+    let path = [prefix, &[name]].concat();
+    if name.is_empty()
+        && let Some(list) = text.strip_prefix('{')
+    {
+        let (mut depth, mut start) = (0, 0);
+        for (at, c) in list.char_indices() {
+            if depth == 0 && matches!(c, ',' | '}') {
+                paths_at(&list[start..at], prefix, found);
+                start = at + 1;
+            }
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => return,
+                '}' => depth -= 1,
+                _ => {}
+            }
+        }
+    } else if let Some(rest) = behind.strip_prefix("::") {
+        paths_at(rest, &path, found);
+    } else if !name.is_empty() {
+        found.push(path.into_iter().map(str::to_owned).collect());
+    }
+}
+
+/// Returns the paths in a module's code that begin with `crate` or `super`, from the root on.
+fn paths(code: &str, module: &[String]) -> Vec<Names> {
     let mut found = Vec::new();
-    for behind in code.split("crate::").skip(1) {
-        match behind.strip_prefix('{') {
-            None => found.push(&behind[..name(behind)]),
-            Some(list) => {
-                let list = list.split('}').next().expect("the part before");
-                found.extend(list.split(',').map(str::trim).map(|item| &item[..name(item)]));
+    for start in ["crate::", "super::"] {
+        for (at, _) in code.match_indices(start) {
+            if !code[..at].ends_with(|c: char| c.is_alphanumeric() || matches!(c, '_' | ':')) {
+                paths_at(&code[at..], &[], &mut found);
             }
         }
     }
-    found
+    let from_root = found.into_iter().map(|path| {
+        let ups = path.iter().take_while(|name| *name == "super").count();
+        let base = if ups == 0 { &[] } else { &module[..module.len() - ups] };
+        [base, &path[ups.max(1)..]].concat()
+    });
+    from_root.collect()
 }
 
 /// Returns the names that lib.rs exports, each with its module.
@@ -51,21 +90,35 @@ fn exports(lib: &str) -> BTreeMap<String, String> {
     pairs.collect()
 }
 
-fn imports() -> Imports {
+/// Reads all sources of core but lib.rs.
+fn sources() -> Vec<Source> {
     let root = root().join("core/src");
     let exports = exports(&fs::read_to_string(root.join("lib.rs")).expect("lib.rs"));
-    let mut imports = Imports::new();
-    for path in sources(&root) {
-        let inside = path.strip_prefix(&root).expect("a path in it");
-        let module = inside.iter().next().and_then(|first| Path::new(first).file_stem());
-        let module = module.and_then(|module| module.to_str()).expect("a name").to_owned();
-        if module == "lib" {
-            continue;
+    let all = files(&root).into_iter().map(|path| {
+        let inside = path.strip_prefix(&root).expect("a path in it").with_extension("");
+        let names = inside.iter().map(|name| name.to_str().expect("a name").to_owned());
+        let module: Names = names.filter(|name| name != "mod").collect();
+        let mut named = paths(&code(&fs::read_to_string(&path).expect("a source")), &module);
+        for path in &mut named {
+            if let Some(module) = path.first().and_then(|name| exports.get(name)) {
+                path.insert(0, module.clone());
+            }
         }
-        let source = code(&fs::read_to_string(&path).expect("a source"));
-        let named = names(&source).into_iter().map(|name| exports.get(name).map_or(name, |m| m));
-        let others = named.filter(|name| *name != module).map(str::to_owned).collect::<Vec<_>>();
-        imports.entry(module).or_default().extend(others);
+        Source { module, named }
+    });
+    all.filter(|source| source.module != ["lib"]).collect()
+}
+
+/// Returns what the modules of a folder import from one another. A folder in it counts as one module.
+fn imports(sources: &[Source], folder: &[String]) -> Imports {
+    let inside = |path: &[String]| path.strip_prefix(folder)?.first().cloned();
+    let mut imports = Imports::new();
+    for Source { module, named } in sources {
+        if let Some(module) = inside(module) {
+            let others = named.iter().filter_map(|path| inside(path));
+            let others = others.filter(|other| *other != module).collect::<Vec<_>>();
+            imports.entry(module).or_default().extend(others);
+        }
     }
     imports
 }
@@ -95,10 +148,19 @@ fn cycle(mut imports: Imports) -> Vec<String> {
 
 #[test]
 fn modules_of_core_import_downwards_only() {
-    let imports = imports();
-    assert!(imports["grid"].contains("mesh") && imports.len() > 30, "{imports:?}");
-    let way = cycle(imports);
-    assert!(way.is_empty(), "modules of core import one another in a circle: {}", way.join(" -> "));
+    let sources = sources();
+    let folders: BTreeSet<_> = sources.iter().map(|s| &s.module[..s.module.len() - 1]).collect();
+    assert!(folders.len() > 10 && imports(&sources, &[])["grid"].contains("mesh"));
+    let bvh = imports(&sources, &["bvh".to_owned()]);
+    assert!(bvh["build"].contains("high") && bvh["high"].contains("index"), "{bvh:?}");
+    for folder in folders {
+        let way = cycle(imports(&sources, folder)).join(" -> ");
+        assert!(
+            way.is_empty(),
+            "modules in core/src/{} import in a circle: {way}",
+            folder.join("/")
+        );
+    }
 }
 
 /// Returns the modules of each layer, the lowest first, by the table in lib.rs.
@@ -113,7 +175,7 @@ fn modules_import_those_of_their_layer_and_of_lower_ones() {
     let layers = layers(&fs::read_to_string(root().join("core/src/lib.rs")).expect("lib.rs"));
     let layer =
         |module: &str| layers.iter().position(|layer| layer.iter().any(|name| name == module));
-    for (module, named) in imports() {
+    for (module, named) in imports(&sources(), &[]) {
         let own = layer(&module).unwrap_or_else(|| panic!("the table in lib.rs lacks {module}"));
         for name in named {
             let is_below = layer(&name).is_none_or(|other| other <= own);
@@ -133,5 +195,13 @@ fn circles_are_found() {
     };
     assert_eq!(of(&[("a", "b"), ("b", "c"), ("a", "c")]), "");
     assert_eq!(of(&[("a", "b"), ("b", "c"), ("c", "b"), ("c", "d")]), "b c b");
-    assert_eq!(names("use crate::{a, b::c}; crate::d::e()"), ["a", "b", "d"]);
+}
+
+#[test]
+fn paths_are_found_wherever_they_begin() {
+    let module = ["bvh", "high", "grow"].map(str::to_owned);
+    let code = "use crate::{a, b::{c, d::e}, f::{self, g}}; use super::cut; super::super::node::X.y; h::super_::i";
+    let found = paths(code, &module).into_iter().map(|path| path.join("::"));
+    let expected = ["a", "b::c", "b::d::e", "f::self", "f::g", "bvh::high::cut", "bvh::node::X"];
+    assert_eq!(found.collect::<Vec<_>>(), expected);
 }

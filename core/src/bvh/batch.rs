@@ -7,59 +7,17 @@
 //! ```
 
 use super::Bvh;
-use super::group::{Group, Stack};
+use super::group::{Group, Together};
 use super::order::{self, SortKey, Sorted};
 use super::rays::{GROUP, Rays};
+use super::stack::GroupStack;
 use crate::aabb::Aabb;
 use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
-use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::ray::{Hit, INVALID_ID};
 use crate::simd::SimdLevel;
 use crate::triangle::TriangleTest;
-
-/// A batch as the loop over its groups sees it.
-pub(crate) trait Together {
-    /// Number of rays.
-    fn count(&self) -> usize;
-
-    /// The ray at a place.
-    fn ray(&self, place: usize) -> Ray;
-
-    /// Loads the ray at a place into a lane of the next group, and returns it. Lanes are filled one after the other.
-    #[inline(always)]
-    fn load(&mut self, _lane: usize, place: usize) -> Ray {
-        self.ray(place)
-    }
-
-    /// Traces a group. Returns a mask of the rays that must be traced alone.
-    #[inline(always)]
-    fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel, is_any: bool) -> u64 {
-        group.trace(level, is_any)
-    }
-
-    /// Answers for a ray that was traced with others: its lane in the group, and its hit or [`Hit::MISS`].
-    fn found(&mut self, place: usize, lane: usize, hit: &Hit);
-
-    /// Traces a ray alone, and answers for it.
-    fn alone(&mut self, place: usize);
-
-    /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
-    /// places: a filter is asked there.
-    #[inline(always)]
-    fn keeps_order(&self) -> bool {
-        false
-    }
-
-    /// Returns true if the filter has to be asked about the first hit of a ray.
-    #[inline(always)]
-    fn asks(&self, _hit: &Hit) -> bool {
-        false
-    }
-
-    /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
-    fn ask(&mut self, _place: usize, _hit: &Hit) {}
-}
 
 /// The rays of a batch, which go in groups.
 pub(crate) struct Groups<'r, C> {
@@ -77,7 +35,7 @@ impl<C: Together> Groups<'_, C> {
     #[inline(always)]
     pub(crate) fn trace(self, level: SimdLevel, is_any: bool) {
         let Self { bvh, mesh, bounds, choice, memory, batch } = self;
-        let (mut rays, mut stack) = (Rays::new(choice), Stack::new());
+        let (mut rays, mut stack) = (Rays::new(choice), GroupStack::new());
         let (rays, stack) = (&mut rays, &mut stack);
         let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count: 0, until: None };
         let mut places = [0; GROUP];

@@ -23,10 +23,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
-use super::node::{Node, WIDTH};
+use super::node::{Node, WIDTH, floats};
 use super::shape_leaf::boxes_of_leaf;
 use super::slab::WIDER;
-use super::walk::bytes;
 use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 
@@ -79,7 +78,7 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         // Turn the bytes of both sides of an axis into numbers.
         let growth = f32x8::splat(simd, growth);
         let [a, b, c, d, e, f] = node.bounds;
-        let (rows, others, last) = (bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f));
+        let (rows, others, last) = (floats(simd, a, d), floats(simd, b, e), floats(simd, c, f));
         let rows = [rows, others, last];
         // Scale them, and move them to the origin of the group.
         let mut boxes = Self { low: [growth; 3], high: [growth; 3] };

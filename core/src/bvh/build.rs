@@ -38,21 +38,22 @@ use zerocopy::{FromZeros, IntoBytes};
 use super::bins::{place_tasks, scatter};
 use super::census::{Census, count};
 use super::high;
+use super::index::{clear_header, cut_index, finish, move_nodes};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
     small_spare,
 };
-use super::node::Node;
+use super::node::{Node, least_node};
 use super::roots::{RECORD, RootRecord, Roots};
 use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
-use crate::arena::{Sizes, first_mut, move_down, section_bytes, split_mut, whole};
+use crate::arena::{Sizes, first_mut, move_down, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::{BuildFlags, Parameters};
+use crate::config::BuildFlags;
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::invariant::OrBug;
@@ -229,76 +230,6 @@ fn build_in(
     let tree = work.top(entries, spare, nodes, &roots);
     let (node_count, levels) = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
     finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
-}
-
-/// Clears the header of an index: if the build ends early, the region must not open as a grid.
-pub(super) fn clear_header(index: &mut Option<&mut [u8]>) {
-    if let Some(header) = index.as_mut().and_then(|index| index.first_chunk_mut::<HEADER_BYTES>()) {
-        header.fill(0);
-    }
-}
-
-/// Returns the places of so many ids and of nodes in an index. No index, or one that is too small, is legal: ids and
-/// nodes for which there is no room are only counted.
-pub(super) fn cut_index<'i>(
-    index: &'i mut Option<&mut [u8]>,
-    ids: u32,
-) -> (&'i mut [u32], &'i mut [Node]) {
-    let behind = index.as_mut().and_then(|index| index.get_mut(HEADER_BYTES..));
-    let sections = behind.and_then(|behind| split_mut::<u32>(behind, ids.into()));
-    let (ids, nodes) = sections.unwrap_or_default();
-    (ids, whole(nodes))
-}
-
-/// Moves nodes together with their child nodes to an earlier place.
-pub(super) fn move_nodes(nodes: &mut [Node], from: Range<u32>, to: u32) {
-    let (moved, from) = (from.start - to, from.start as usize..from.end as usize);
-    if moved > 0 {
-        let found = nodes.get_mut(from.clone()).or_bug("nodes without room");
-        for node in found.unwrap_or_default() {
-            node.child -= moved;
-        }
-        move_down(nodes, from, to as usize);
-    }
-}
-
-/// Ends a build: checks that the index, if there is one, holds the tree, puts zeros behind it and returns its header.
-pub(super) fn finish(
-    mesh: &TriangleMesh<'_>,
-    quality: Quality,
-    scene: Aabb,
-    index: Option<&mut [u8]>,
-    finite: u32,
-    node_count: u32,
-    levels: u32,
-) -> Result<Header, Error> {
-    let needed_bytes = index_bytes(finite.into(), node_count.into());
-    if let Some(index) = index {
-        let blob = first_mut(index, needed_bytes, Region::Index)?;
-        let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
-        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        if let Some(padding) = blob.get_mut(used..).or_bug("nodes behind the end of the index") {
-            padding.fill(0);
-        }
-    }
-    let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(Parameters::Bvh { quality }, mesh, &lattice);
-    header.skipped_count = mesh.triangle_count() - finite;
-    header.reference_count = finite;
-    header.node_count = node_count;
-    header.levels = levels;
-    header.blob_bytes = needed_bytes;
-    Ok(header)
-}
-
-/// The least extent of a node in parts of the scene's: 254 steps of 2^-60.
-const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
-
-/// The least extent that a node is quantised for, where it is called `least`: smaller boxes count as this large. So no
-/// step is below 2^-60 of the scene's extent, and a finite number can stand for the inverse of a zero direction
-/// ([`slab`](super::slab)).
-pub(crate) fn least_node(scene: &Aabb) -> f32 {
-    scene.size().max_element() * LEAST_NODE
 }
 
 /// Finds the key of every triangle. Each task counts its triangles of each bin.

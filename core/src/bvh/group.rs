@@ -9,34 +9,27 @@
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
-//!       more than eight rays: intersect the beam of the whole group with the eight boxes; it decides some for all rays
-//!       then, whichever takes fewer vector tests:
-//!           ray by ray: each with all eight boxes
-//!           box by box: each that is undecided with sixteen rays at a time
+//!       intersect the rays with them (met.rs)
 //!       push the children with the rays that met them, for closest hits the nearest last; prefetch in a large tree
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
 //! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
-use zerocopy::{FromBytes, IntoBytes, transmute_mut};
+use fearless_simd::Simd;
 
 use super::Bvh;
-use super::boxes::{Beam, WideBoxes, bits};
+use super::boxes::WideBoxes;
 use super::group_leaf::{BoxLeaves, Leaf, Leaves, Offer, Scattered, TriangleLeaves};
 use super::interleave;
+use super::met::Met;
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
-use super::walk::{STACK, StackEntry};
+use super::stack::{GroupEntry, GroupStack};
 use crate::aabb::Aabb;
-use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
+use crate::ray::{Hit, Ray};
 use crate::simd::{HAS_PREFETCH, Kernel, SimdLevel, dispatch};
-
-/// With more rays than this, the beam of all rays is tested before the rays.
-const FEW_RAYS: u32 = 8;
 
 /// Rays are scattered, and share little, if some origins lie farther apart than this part of the scene.
 const SCATTERED: f32 = 1.0 / 4.0;
@@ -57,45 +50,6 @@ fn wait_for_memory(rays: &Rays, bvh: &Bvh<'_>) -> bool {
     bvh.exceeds(CORE_CACHES) && rays.are_apart(part)
 }
 
-/// Counts the vectors of eight rays that hold at least one of some rays.
-#[inline(always)]
-pub(super) const fn octets(rays: u64) -> u32 {
-    let pairs = rays | rays >> 1;
-    let fours = pairs | pairs >> 2;
-    ((fours | fours >> 4) & 0x0101_0101_0101_0101).count_ones()
-}
-
-/// A child that waits, and the rays that met it.
-#[repr(C)]
-#[derive(Clone, Copy, FromBytes, IntoBytes)]
-pub(crate) struct GroupEntry {
-    /// Node and slot.
-    place: u32,
-    /// The least distance at which one of the rays enters; any number if children may come in any order.
-    near: f32,
-    rays: u64,
-}
-
-impl GroupEntry {
-    const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
-}
-
-/// The stack of a group.
-pub(crate) struct Stack([GroupEntry; STACK]);
-
-impl Stack {
-    pub(crate) const fn new() -> Self {
-        Self([GroupEntry::NONE; STACK])
-    }
-
-    /// Cuts the stack into shares for single rays.
-    #[inline(always)]
-    pub(super) fn shares(&mut self, size: usize) -> impl Iterator<Item = &mut [StackEntry]> {
-        let entries: &mut [StackEntry; 2 * STACK] = transmute_mut!(&mut self.0);
-        entries.chunks_exact_mut(size)
-    }
-}
-
 /// A group of rays, and the tree that they go through.
 pub(crate) struct Group<'r> {
     pub(crate) bvh: &'r Bvh<'r>,
@@ -103,7 +57,7 @@ pub(crate) struct Group<'r> {
     /// The box of the tree.
     pub(crate) bounds: &'r Aabb,
     pub(crate) rays: &'r mut Rays,
-    pub(crate) stack: &'r mut Stack,
+    pub(crate) stack: &'r mut GroupStack,
     /// Number of rays in the first slots.
     pub(crate) count: usize,
     /// For each ray the largest `t` of a hit that matters; `None`: its `t_max`. If given, a ray without a hit ends with
@@ -134,6 +88,49 @@ impl Group<'_> {
     }
 }
 
+/// A batch as the loop over its groups sees it.
+pub(crate) trait Together {
+    /// Number of rays.
+    fn count(&self) -> usize;
+
+    /// The ray at a place.
+    fn ray(&self, place: usize) -> Ray;
+
+    /// Loads the ray at a place into a lane of the next group, and returns it. Lanes are filled one after the other.
+    #[inline(always)]
+    fn load(&mut self, _lane: usize, place: usize) -> Ray {
+        self.ray(place)
+    }
+
+    /// Traces a group. Returns a mask of the rays that must be traced alone.
+    #[inline(always)]
+    fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel, is_any: bool) -> u64 {
+        group.trace(level, is_any)
+    }
+
+    /// Answers for a ray that was traced with others: its lane in the group, and its hit or [`Hit::MISS`].
+    fn found(&mut self, place: usize, lane: usize, hit: &Hit);
+
+    /// Traces a ray alone, and answers for it.
+    fn alone(&mut self, place: usize);
+
+    /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
+    /// places: a filter is asked there.
+    #[inline(always)]
+    fn keeps_order(&self) -> bool {
+        false
+    }
+
+    /// Returns true if the filter has to be asked about the first hit of a ray.
+    #[inline(always)]
+    fn asks(&self, _hit: &Hit) -> bool {
+        false
+    }
+
+    /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
+    fn ask(&mut self, _place: usize, _hit: &Hit) {}
+}
+
 /// The kernel over a group.
 struct Descent<'r, 'g, L> {
     group: &'r mut Group<'g>,
@@ -146,14 +143,14 @@ impl<L: Leaves> Kernel for Descent<'_, '_, L> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
-        let Group { bvh, bounds, rays, count, until, .. } = &mut *self.group;
+        let Group { bvh, mesh, bounds, rays, stack, count, until } = &mut *self.group;
         let alone = rays.prepare(simd, *count, bounds);
         if let Some(until) = until {
             rays.take_until(until);
         }
         match self.leaves.scattered() {
             Scattered::Interleaved if wait_for_memory(rays, bvh) => {
-                return alone | interleave::trace(simd, self.group);
+                return alone | interleave::trace(simd, bvh, mesh, bounds, rays, stack);
             }
             Scattered::Interleaved | Scattered::Alone if rays.are_apart(SCATTERED) => {
                 return alone | rays.alive;
@@ -168,7 +165,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
     #[inline(always)]
     fn descend<S: Simd>(self, simd: S) {
         let Self { group: Group { bvh, mesh, bounds, rays, stack, .. }, mut leaves } = self;
-        let stack = &mut stack.0;
+        let stack = stack.entries();
         let mut budget = bvh.budget();
         let mut top = 0;
         let mut met = Met::NONE;
@@ -176,8 +173,9 @@ impl<L: Leaves> Descent<'_, '_, L> {
         let beam = rays.beam(simd);
         let (mut child, mut mask) = (Child::Inner(0), rays.alive);
         loop {
-            let Some(rest) = budget.checked_sub(1) else { return };
-            budget = rest;
+            if !budget.take(1) {
+                return;
+            }
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
@@ -222,145 +220,6 @@ impl<L: Leaves> Descent<'_, '_, L> {
                 }
             }
         }
-    }
-}
-
-/// The intersections of rays with up to eight boxes.
-pub(super) struct Met {
-    /// The boxes that any of them met, as bits.
-    pub(super) slots: u32,
-    /// For each box the rays that met it, as bits, and where the first one enters if that matters.
-    pub(super) rays: [u64; WIDTH],
-    pub(super) near: [f32; WIDTH],
-}
-
-impl Met {
-    pub(super) const NONE: Self = Self { slots: 0, rays: [0; WIDTH], near: [0.0; WIDTH] };
-
-    /// Intersects some rays of a group with the boxes that are used; finds entry distances only if they are wanted.
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "each is its own")]
-    pub(super) fn meet<S: Simd>(
-        &mut self,
-        simd: S,
-        boxes: &WideBoxes<f32x8<S>>,
-        rays: &Rays,
-        beam: &Beam<S>,
-        mask: u64,
-        used: u32,
-        wants_near: bool,
-    ) {
-        let count = mask.count_ones();
-        let (mut some, mut all, mut enter) = (used, 0, f32x8::splat(simd, 0.0));
-        // For more than a few rays, intersect the beam of the whole group with the boxes.
-        if count > FEW_RAYS {
-            let beam = boxes.meet_beam(simd, beam);
-            some &= beam.some;
-            (all, enter) = (some & beam.all, beam.enter);
-        }
-        // Ray by ray, each ray takes one test of all eight boxes. Box by box, each box that the beam left undecided
-        // takes one test for every sixteen rays, which counts as two.
-        let unsure = some & !all;
-        if count <= octets(mask) * unsure.count_ones() {
-            one_by_one(simd, boxes, rays, mask, wants_near, self);
-        } else {
-            side_by_side(simd, boxes, rays, mask, unsure, wants_near, self);
-        }
-        self.add_all(all, mask, enter);
-        self.slots &= some;
-    }
-
-    /// Adds boxes that all rays meet, each with a lower bound of their entry distances.
-    #[inline(always)]
-    fn add_all<S: Simd>(&mut self, all: u32, rays: u64, enter: f32x8<S>) {
-        self.slots |= all;
-        let enter: [f32; WIDTH] = enter.into();
-        let mut rest = all;
-        while rest != 0 {
-            let slot = rest.trailing_zeros() as usize % WIDTH;
-            rest &= rest - 1;
-            self.rays[slot] = rays;
-            self.near[slot] = enter[slot];
-        }
-    }
-}
-
-/// Intersects rays with all eight boxes of a node, ray by ray.
-#[inline(always)]
-fn one_by_one<S: Simd>(
-    simd: S,
-    boxes: &WideBoxes<f32x8<S>>,
-    rays: &Rays,
-    mask: u64,
-    wants_near: bool,
-    met: &mut Met,
-) {
-    let zero = u32x8::splat(simd, 0);
-    let far_away = f32x8::splat(simd, f32::INFINITY);
-    let mut least = far_away;
-    let mut halves = [zero; 2];
-    for (first, met_by) in (0..).step_by(32).zip(&mut halves) {
-        let mut rest = mask >> first & 0xffff_ffff;
-        while rest != 0 {
-            let bit = rest.trailing_zeros();
-            rest &= rest - 1;
-            let (near, met) = boxes.meet(simd, &rays.slab(simd, first + bit));
-            *met_by |= met.select(u32x8::splat(simd, 1 << bit), zero);
-            if wants_near {
-                least = least.lesser(met.select(near, far_away));
-            }
-        }
-    }
-    let slots = !(halves[0] | halves[1]).simd_eq(zero);
-    let [low, high]: [[u32; WIDTH]; 2] = [halves[0].into(), halves[1].into()];
-    let mut masks = [0; WIDTH];
-    for ((mask, low), high) in masks.iter_mut().zip(low).zip(high) {
-        *mask = u64::from(low) | u64::from(high) << 32;
-    }
-    (met.slots, met.rays) = (bits(slots), masks);
-    if wants_near {
-        met.near = least.into();
-    }
-}
-
-/// Intersects rays with the boxes of a node that the beam did not decide, box by box: sixteen rays at a time.
-#[inline(always)]
-fn side_by_side<S: Simd>(
-    simd: S,
-    boxes: &WideBoxes<f32x8<S>>,
-    rays: &Rays,
-    mask: u64,
-    unsure: u32,
-    wants_near: bool,
-    met: &mut Met,
-) {
-    let far_away = f32x16::splat(simd, f32::INFINITY);
-    let sides = boxes.sides();
-    met.slots = 0;
-    let mut rest = unsure;
-    while rest != 0 {
-        let slot = rest.trailing_zeros() as usize % WIDTH;
-        rest &= rest - 1;
-        let child = WideBoxes::<f32x16<S>>::one(simd, &sides, slot);
-        let (mut by, mut least) = (0, far_away);
-        for which in 0..GROUP / 16 {
-            let of_sixteen = mask >> (16 * which) & 0xffff;
-            if of_sixteen == 0 {
-                continue;
-            }
-            let (near, is_met) = child.meet(simd, &rays.sixteen(simd, which));
-            // Mask afterwards: an invalid ray has NaN distances and would count as a hit.
-            let is_met = is_met & mask32x16::from_bitmask(simd, of_sixteen);
-            by |= is_met.to_bitmask() << (16 * which);
-            if wants_near {
-                least = least.lesser(is_met.select(near, far_away));
-            }
-        }
-        met.rays[slot] = by;
-        if wants_near {
-            met.near[slot] = least.reduce_min();
-        }
-        met.slots |= u32::from(by != 0) << slot;
     }
 }
 

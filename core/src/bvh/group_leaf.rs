@@ -10,7 +10,7 @@ use fearless_simd::Simd;
 
 use super::Bvh;
 use super::boxes::{Beam, WideBoxes, bits};
-use super::group::{Met, octets};
+use super::met::{Met, octets};
 use super::rays::{OCTETS, Rays};
 use super::shape_leaf::{nearest_of, pad_of};
 use crate::aabb::Aabb;

@@ -20,11 +20,13 @@ use fearless_simd::Simd;
 
 use super::Bvh;
 use super::boxes::{WideBoxes, bits};
-use super::group::Group;
 use super::group_leaf::{Leaf, filter_for_each};
 use super::node::{Child, WIDTH};
 use super::rays::Rays;
-use super::walk::{STACK, StackEntry, pop, push};
+use super::stack::{GroupStack, STACK, StackEntry, pop, push};
+use crate::aabb::Aabb;
+use crate::budget::Budget;
+use crate::mesh::TriangleMesh;
 use crate::simd::prefetch;
 
 /// Rays that take turns.
@@ -46,16 +48,20 @@ struct Traveller {
     turns: u32,
     /// Children on the stack.
     top: usize,
-    /// Nodes and leaves that it may still enter: damaged bytes may lead in circles.
-    budget: usize,
+    budget: Budget,
 }
 
 /// Finds the closest hit of each ray of a prepared group. Returns a mask of the rays that must be traced alone.
 #[inline(always)]
-pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
-    let Group { bvh, mesh, bounds, rays, stack, .. } = group;
-    let (bvh, mesh, budget) = (*bvh, *mesh, bvh.budget());
-    let triangles = mesh.wide();
+pub(super) fn trace<S: Simd>(
+    simd: S,
+    bvh: &Bvh<'_>,
+    mesh: &TriangleMesh<'_>,
+    bounds: &Aabb,
+    rays: &mut Rays,
+    stack: &mut GroupStack,
+) -> u64 {
+    let (triangles, budget) = (mesh.wide(), bvh.budget());
     let start = |ray| Traveller { ray, child: Some(Child::Inner(0)), turns: 0, top: 0, budget };
     let mut travellers = [Traveller { child: None, ..start(0) }; IN_FLIGHT];
     let (mut queue, mut alone) = (rays.alive, 0);
@@ -68,6 +74,11 @@ pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
             }
             let Some(child) = one.child else { continue };
             are_done = false;
+            let is_new = one.turns == 0;
+            if is_new && !one.budget.take(1) {
+                one.child = None;
+                continue;
+            }
 
             // Enter the child, or fetch what it holds.
             let next = match child {
@@ -101,11 +112,9 @@ pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
 
             // Fetch what its next turn reads.
             one.child = next.or_else(|| pop(bvh, stack, &mut one.top, rays.end_of(one.ray)));
-            (one.turns, one.budget) = (0, one.budget.saturating_sub(1));
-            match one.child {
-                _ if one.budget == 0 => one.child = None,
-                Some(child) => bvh.prefetch(child),
-                None => {}
+            one.turns = 0;
+            if let Some(child) = one.child {
+                bvh.prefetch(child);
             }
         }
         if are_done {

@@ -16,9 +16,9 @@
 //!
 //! ```text
 //! format         node, layout, validate
-//! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`
-//! one ray        search, walk (slab; shape_leaf for shapes)
-//! batches        batch: order, rays, group (boxes, group_leaf), interleave
+//! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`; index
+//! one ray        search, walk (slab, stack; shape_leaf for shapes)
+//! batches        batch: order, rays, group (boxes, met, group_leaf), interleave
 //! points         nearest
 //! moved meshes   refit
 //! ```
@@ -44,9 +44,11 @@ mod crowd;
 mod group;
 mod group_leaf;
 mod high;
+mod index;
 mod interleave;
 mod key;
 mod layout;
+mod met;
 mod nearest;
 mod node;
 mod order;
@@ -57,6 +59,7 @@ mod search;
 mod shape_leaf;
 mod slab;
 mod sort;
+mod stack;
 mod subtree;
 mod top;
 mod units;
@@ -65,23 +68,23 @@ mod walk;
 
 use crate::arena::{section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::budget::Budget;
 use crate::eight::first_eight;
 use crate::error::Error;
 use crate::simd::prefetch;
 use crate::visit::Visitor;
-pub(crate) use batch::{Groups, Together};
+pub(crate) use batch::Groups;
 pub(crate) use build::{bound, build, sizes};
-pub(crate) use group::{Group, Stack};
+pub(crate) use group::{Group, Together};
+pub(crate) use layout::LEVELS;
 use node::{LEAF, Node};
 pub(crate) use order::SortKey;
 pub(crate) use rays::{GROUP, Rays, lanes};
 pub(crate) use refit::refit;
 pub(crate) use search::Scope;
+pub(crate) use stack::GroupStack;
+use stack::{FEW_LEVELS, StackEntry, with_deep_stack, with_small_stack};
 pub(crate) use validate::proof_bytes;
-
-/// Levels of nodes, at most. Quality `fast` makes up to 49: 20 by SAH and 9 that halve roots ([`top`]), and 20 of a
-/// subtree, which has at most 20 nodes ([`subtree`]). Quality `high` makes up to 35 ([`high`]). The rest is reserve.
-pub(crate) const LEVELS: u32 = 64;
 
 /// The scratch that the build of a tree with this header takes.
 pub(crate) fn scratch_bytes(header: &Header) -> u64 {
@@ -119,8 +122,8 @@ impl<'a> Bvh<'a> {
     /// Lends a stack for a point, or for a ray that has filled its first one. Most trees are shallow and get a small
     /// one, which takes less time to zero.
     #[inline(always)]
-    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
-        if self.levels <= walk::FEW_LEVELS { with_small_stack(walk) } else { with_deep_stack(walk) }
+    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [StackEntry]) -> R) -> R {
+        if self.levels <= FEW_LEVELS { with_small_stack(walk) } else { with_deep_stack(walk) }
     }
 
     /// The number of ids in all leaves.
@@ -141,8 +144,8 @@ impl<'a> Bvh<'a> {
 
     /// Nodes and leaves that a ray enters, at most: every node once, and eight leaves of each.
     #[inline(always)]
-    const fn budget(&self) -> usize {
-        self.nodes.len() * 9
+    const fn budget(&self) -> Budget {
+        Budget::new(self.nodes.len() * 9)
     }
 
     /// Returns true if nodes and ids take more than so many bytes.
@@ -195,15 +198,4 @@ impl<'a> Bvh<'a> {
             })
         })
     }
-}
-
-/// Out of line, as the next function is: otherwise each would have the stack of both.
-#[inline(never)]
-fn with_small_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
-    walk(&mut [0; walk::SMALL_STACK])
-}
-
-#[inline(never)]
-fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
-    walk(&mut [0; walk::STACK])
 }

@@ -28,10 +28,10 @@ use fearless_simd::{Simd, f32x8};
 
 use super::Bvh;
 use super::boxes::{bits, splat};
-use super::node::{Child, Node, WIDTH};
+use super::node::{Child, Node, WIDTH, floats};
 use super::shape_leaf::nearest_of;
 use super::slab::{TINY, WIDER};
-use super::walk::{StackEntry, bytes, pop, waiting};
+use super::stack::{StackEntry, pop, waiting};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::Eight;
@@ -102,7 +102,7 @@ fn boxes<S: Simd>(simd: S, node: &Node, point: &Point) -> f32x8<S> {
     let (origin, steps) = (node.origin(), node.wide_steps(simd));
     let scale = f32x8::splat(simd, point.scale);
     let [a, b, c, d, e, f] = node.bounds;
-    let rows = [bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f)];
+    let rows = [floats(simd, a, d), floats(simd, b, e), floats(simd, c, f)];
     let mut away = [scale; 3];
     for axis in 0..3 {
         let step = steps[axis] * scale;
@@ -193,12 +193,12 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
         let point = Point::new(*point, bounds);
         let mut reach = point.reach(*within);
         let mut top = 0;
-        // Damaged bytes may lead in circles; a tree's nodes are entered once.
         let mut budget = bvh.budget();
         let mut child = Child::Inner(0);
         loop {
-            let Some(rest) = budget.checked_sub(1) else { return };
-            budget = rest;
+            if !budget.take(1) {
+                return;
+            }
             match child {
                 Child::Inner(number) => {
                     tally.grid_step();

@@ -15,7 +15,7 @@
 //! far side of a slab test has a margin for it ([`slab`](super::slab)).
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, u32x4, u32x8};
+use fearless_simd::{Simd, f32x4, f32x8, i32x8, u8x16, u16x8, u32x4, u32x8};
 use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
@@ -168,7 +168,7 @@ impl Node {
     }
 
     /// Writes the boxes of the children that exist; `bounds` holds them all, and `least` is
-    /// [`least_node`](super::build::least_node) of the scene.
+    /// [`least_node`] of the scene.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
         self.frame(bounds, least);
         for (slot, child) in boxes.iter().enumerate() {
@@ -295,6 +295,31 @@ impl<S: Simd> Quantiser<S> {
 const MARGIN: f32 = 1.0 / 64.0;
 /// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than their rounding.
 const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
+
+/// The least extent of a node in parts of the scene's: 254 steps of 2^-60.
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
+
+/// The least extent that a node is quantised for, where it is called `least`: smaller boxes count as this large. So no
+/// step is below 2^-60 of the scene's extent, and a finite number can stand for the inverse of a zero direction
+/// ([`slab`](super::slab)).
+pub(crate) fn least_node(scene: &Aabb) -> f32 {
+    scene.size().max_element() * LEAST_NODE
+}
+
+/// Two rows of eight sides as floats.
+#[inline(always)]
+pub(crate) fn floats<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>, f32x8<S>) {
+    let both: [u8; 16] = transmute!([low, high]);
+    let (low, high) = u8x16::simd_from(simd, both).widen();
+    (eight_floats(low), eight_floats(high))
+}
+
+#[inline(always)]
+fn eight_floats<S: Simd>(half: u16x8<S>) -> f32x8<S> {
+    let (low, high) = half.widen();
+    // Signed: one instruction, where the unsigned conversion is several.
+    low.combine(high).bitcast::<i32x8<S>>().to_float()
+}
 
 /// Returns the exponent bits of a power of two: the next one above a 254th of an extent.
 fn exponent_for(extent: f32) -> u8 {

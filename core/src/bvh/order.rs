@@ -10,11 +10,10 @@
 //! its nodes, and the next group finds them in the cache. Rays that are near each other as they are given are not
 //! sorted, nor are too few rays for groups to share anything: there sorting costs more than it gains.
 
+use super::group::Together;
+use super::rays::GROUP;
 use crate::aabb::Aabb;
 use crate::ray::Ray;
-
-use super::batch::Together;
-use super::rays::GROUP;
 
 /// A ray that is sorted: its key above its place in the window.
 pub(crate) type SortKey = u64;

@@ -16,10 +16,10 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8};
 use glam::Vec3A;
 
-use super::build::least_node;
-use super::node::{Child, LEAF, Node, Sides, WIDTH};
-use super::walk::{FEW_LEVELS, bytes};
-use super::{Bvh, LEVELS};
+use super::Bvh;
+use super::layout::LEVELS;
+use super::node::{Child, LEAF, Node, Sides, WIDTH, floats, least_node};
+use super::stack::FEW_LEVELS;
 use crate::aabb::{Aabb, lesser};
 use crate::arena::split_mut;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
@@ -354,10 +354,10 @@ impl Node {
     #[inline(always)]
     fn weight<S: Simd>(&self, simd: S) -> f64 {
         let inner = core::array::from_fn(|slot| (self.inner() >> slot & 1) as u8);
-        let (inner, counts) = bytes(simd, inner, self.counts);
+        let (inner, counts) = floats(simd, inner, self.counts);
         let cost = inner + counts;
         let [a, b, c, d, e, f] = self.bounds;
-        let (x, y, z) = (bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f));
+        let (x, y, z) = (floats(simd, a, d), floats(simd, b, e), floats(simd, c, f));
         let none = f32x8::splat(simd, 0.0);
         let x = (x.1 - x.0).greater(none);
         let y = (y.1 - y.0).greater(none);

@@ -10,7 +10,8 @@
 use super::Bvh;
 use super::nearest::ClosestSearch;
 use super::slab::Slab;
-use super::walk::{FIRST_STACK, OneRay, StackEntry, Walk, Walked};
+use super::stack::{FIRST_STACK, StackEntry};
+use super::walk::{OneRay, Walk, Walked};
 use crate::aabb::Aabb;
 use crate::approach::{Approach, LineF64};
 use crate::counters::{Counters, Tally};
@@ -181,7 +182,7 @@ mod tests {
 
     use super::*;
     use crate::arena::Block;
-    use crate::bvh::walk::STACK;
+    use crate::bvh::stack::STACK;
     use crate::config::Config;
     use crate::grid::Grid;
     use crate::random::point;

@@ -9,8 +9,7 @@
 use fearless_simd::{Simd, f32x4, f32x8};
 
 use super::node::WIDTH;
-use super::slab::Slab;
-use super::walk::flips_of;
+use super::slab::{Slab, flips_of};
 use crate::aabb::{Aabb, greater, lesser};
 use crate::eight::{RowBytes, join, load, transpose};
 use crate::extremes::Extremes;

@@ -208,3 +208,14 @@ fn moved_back(point: Vec3A, by: f32, inverse: Vec3A) -> Vec3A {
     let by = Vec3A::splat(by);
     point + (by + (point.abs() + by) * (2.0 * f32::EPSILON)).copysign(inverse)
 }
+
+/// The near side on each axis: 0 for the low side, [`FLIP`] for the high side.
+pub(super) type NearSides = [usize; 3];
+/// The distance in rows of [`Node::bounds`](super::node::Node) from the low side of an axis to its high side. XOR with it swaps the sides.
+pub(super) const FLIP: usize = 3;
+
+/// Finds the near side on each axis.
+#[inline(always)]
+pub(super) fn flips_of(slab: &Slab) -> NearSides {
+    slab.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
+}

@@ -106,7 +106,7 @@ pub(crate) struct Top {
 /// Makes the nodes over some items and writes all but the topmost to `nodes`. `record` returns the node of a subtree,
 /// which becomes a child, and its levels. Returns `None` if `nodes` is too short.
 ///
-/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::build::least_node) of the scene.
+/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::node::least_node) of the scene.
 pub(crate) fn build(
     items: &mut [RootItem],
     record: impl Fn(u32) -> (Node, u32),

@@ -14,11 +14,13 @@
 
 use glam::DVec3;
 
+use super::Bvh;
+use super::layout::LEVELS;
 use super::node::{Child, LEAF, Node, WIDTH};
-use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
 use crate::arena::first_mut;
 use crate::blob::{Header, corrupt};
+use crate::budget::Budget;
 use crate::cell::Lattice;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
@@ -74,7 +76,8 @@ impl Bvh<'_> {
         let mut levels =
             [OpenNode { node: 0, rest: 0, min: DVec3::ZERO, max: DVec3::ZERO }; LEVELS as usize];
         let (mut depth, mut deepest) = (0, 1);
-        let mut budget = self.nodes.len();
+        // Every node is met once.
+        let mut budget = Budget::new(self.nodes.len());
         let mut ids = 0;
         let start = |node: u32, min, max| OpenNode { node, rest: 0xff, min, max };
         let everywhere = DVec3::INFINITY;
@@ -88,7 +91,9 @@ impl Bvh<'_> {
             let wrong = self.wrong_node(number);
             let node = self.nodes.get(number as usize).ok_or(wrong)?;
             if level.rest == 0xff {
-                budget = budget.checked_sub(1).ok_or(wrong)?;
+                if !budget.take(1) {
+                    return Err(wrong);
+                }
                 node.check(least, number == 0 && self.ids.is_empty()).ok_or(wrong)?;
             }
             if level.rest == 0 {
@@ -127,7 +132,7 @@ impl Bvh<'_> {
                 }
             }
         }
-        if ids != self.ids.len() || budget != 0 {
+        if ids != self.ids.len() || !budget.is_used_up() {
             return Err(corrupt(core::mem::offset_of!(Header, node_count)));
         }
         if header.levels as usize != deepest {

@@ -17,15 +17,16 @@
 use core::hint::black_box;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
-use zerocopy::transmute;
+use fearless_simd::{Simd, f32x8, u32x8};
 
 use super::Bvh;
 use super::boxes::{bits, splat};
-use super::node::{Child, Node, WIDTH};
+use super::node::{Child, Node, WIDTH, floats};
 use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
-use super::slab::Slab;
+use super::slab::{FLIP, NearSides, Slab, flips_of};
+use super::stack::{StackEntry, pop, push};
 use crate::aabb::{Aabb, greater, lesser};
+use crate::budget::Budget;
 use crate::counters::Tally;
 use crate::eight::Eight;
 use crate::extremes::Extremes;
@@ -36,22 +37,6 @@ use crate::ray::Ray;
 use crate::search::{Outcome, Search};
 use crate::simd::{HAS_VECTORS, Kernel};
 use crate::triangle::TriangleTest;
-
-/// Places on the first stack of a ray. It is short, because every query zeroes it; the few rays that need more places
-/// go on with a larger stack.
-pub(crate) const FIRST_STACK: usize = 32;
-
-/// Places on the largest stack: seven a level, and one.
-pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
-
-/// The most levels of a tree for which the small stack is large enough, as it is for nearly all.
-pub(crate) const FEW_LEVELS: u32 = 14;
-/// Places on a small stack.
-pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
-
-/// A child on the stack: in the high half the bits of the distance at which the ray enters it, in the low
-/// half its node and slot.
-pub(crate) type StackEntry = u64;
 
 /// The traversal of a single ray: the ray, and the search that receives its hits.
 pub(crate) struct OneRay<'r, F, T> {
@@ -87,8 +72,7 @@ pub(crate) struct Resume {
     top: usize,
     /// The end of the ray.
     end: f32,
-    /// Nodes and leaves that it may still enter.
-    budget: usize,
+    budget: Budget,
 }
 
 /// The outcome of a walk.
@@ -112,11 +96,6 @@ struct Wide<S: Simd> {
     start: f32x8<S>,
     filter: RayFilter,
 }
-
-/// The near side on each axis: 0 for the low side, [`FLIP`] for the high side.
-pub(super) type NearSides = [usize; 3];
-/// The distance in rows of [`Node::bounds`] from the low side of an axis to its high side. XOR with it swaps the sides.
-const FLIP: usize = 3;
 
 impl<S: Simd> Wide<S> {
     #[inline(always)]
@@ -270,12 +249,6 @@ fn predicted(slot: u32) -> u32 {
     }
 }
 
-/// Finds the near side on each axis.
-#[inline(always)]
-pub(super) fn flips_of(slab: &Slab) -> NearSides {
-    slab.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
-}
-
 /// Does the same as [`Wide::meet`] box by box, for machines without vectors.
 #[inline(never)]
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
@@ -305,28 +278,13 @@ fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>)
 #[inline(always)]
 fn side<S: Simd>(simd: S, node: &Node, axis: usize, flip: usize) -> f32x8<S> {
     let row = row(node, axis, flip);
-    bytes(simd, row, row).0
+    floats(simd, row, row).0
 }
 
 /// The row of a side. The mask shows the compiler that the row exists.
 #[inline(always)]
 fn row(node: &Node, axis: usize, flip: usize) -> [u8; WIDTH] {
     node.bounds[axis % 3 + (flip & FLIP)]
-}
-
-/// Twice eight bytes as numbers.
-#[inline(always)]
-pub(crate) fn bytes<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>, f32x8<S>) {
-    let both: [u8; 16] = transmute!([low, high]);
-    let (low, high) = u8x16::simd_from(simd, both).widen();
-    (numbers(low), numbers(high))
-}
-
-#[inline(always)]
-fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
-    let (low, high) = half.widen();
-    // Signed: one instruction, where the unsigned conversion is several.
-    low.combine(high).bitcast::<i32x8<S>>().to_float()
 }
 
 impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
@@ -350,7 +308,6 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         );
         let wide = wide.as_ref().map(black_box);
         let flips = flips_of(slab);
-        // Damaged bytes may lead in circles; a tree's nodes are entered once.
         let start = Resume { number: 0, top: 0, end: slab.end, budget: bvh.budget() };
         let Resume { number, mut top, mut end, mut budget } = resume.unwrap_or(start);
         let mut child = Child::Inner(number);
@@ -361,10 +318,9 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                     return Walked::Full;
                 }
                 tally.grid_step();
-                let node = bvh.nodes.get(number as usize);
-                let rest = budget.checked_sub(1);
-                let (Some(node), Some(rest)) = (node, rest) else { return Walked::Through };
-                budget = rest;
+                let Some(node) = bvh.nodes.get(number as usize).filter(|_| budget.take(1)) else {
+                    return Walked::Through;
+                };
                 // Intersect the ray with the eight boxes of the node.
                 let (met, near) = match wide {
                     Some(ray) => ray.meet(simd, node, flips, end),
@@ -383,8 +339,9 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
             // Filter the triangles of a leaf, all eight together. Decide those that pass one by one in f64.
             let Child::Leaf { first, count } = child else { continue };
             let ids = bvh.leaf(first, count);
-            let Some(rest) = budget.checked_sub(1) else { return Walked::Through };
-            budget = rest;
+            if !budget.take(1) {
+                return Walked::Through;
+            }
             tally.cell_step();
             tally.primitive_tests(ids.len());
             if F::OF_BOXES
@@ -451,56 +408,6 @@ fn offer_leaf<S: Simd, F: Search>(
         }
     }
     false
-}
-
-/// The entry of a child that is `near` away, as the bits of an f32.
-#[inline(always)]
-pub(super) fn waiting(node: u32, slot: u32, near: u32) -> StackEntry {
-    u64::from(near) << 32 | u64::from(node << 3 | slot)
-}
-
-/// Pushes a child so that the nearest child of a node is popped first. `near` holds the bits of a distance: distance
-/// and child are stored as one integer, because a pop that spans two stores would wait for both.
-#[inline(always)]
-pub(super) fn push(
-    stack: &mut [StackEntry],
-    top: &mut usize,
-    base: usize,
-    node: u32,
-    slot: u32,
-    near: u32,
-) {
-    let waiting = waiting(node, slot, near);
-    let mut at = *top;
-    let Some(_) = stack.get(at) else { return };
-    *top += 1;
-    while at > base
-        && let Some(&below) = stack.get(at - 1)
-        && f32::from_bits((below >> 32) as u32) < f32::from_bits(near)
-    {
-        if let Some(slot) = stack.get_mut(at) {
-            *slot = below;
-        }
-        at -= 1;
-    }
-    if let Some(slot) = stack.get_mut(at) {
-        *slot = waiting;
-    }
-}
-
-/// Pops the next child that does not begin behind the end of the ray.
-#[inline(always)]
-pub(super) fn pop(bvh: &Bvh<'_>, stack: &[StackEntry], top: &mut usize, end: f32) -> Option<Child> {
-    loop {
-        *top = top.checked_sub(1)?;
-        let waiting = *stack.get(*top)?;
-        let is_behind = f32::from_bits((waiting >> 32) as u32) > end;
-        if !is_behind {
-            #[expect(clippy::cast_possible_truncation, reason = "the low half")]
-            let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
-            return Some(bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot)));
-        }
-    }
 }
 
 #[cfg(test)]

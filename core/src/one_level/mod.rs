@@ -38,8 +38,8 @@ pub(crate) use build::{Overlay, Plan, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, Scratch, longest};
-pub(crate) use placed::PlacedBatch;
-pub(crate) use spread::{Spread, fill, mark};
+pub(crate) use placed::{PlacedBatch, Spread};
+pub(crate) use spread::{fill, mark};
 pub(crate) use triangles::MeshSpread;
 pub(crate) use validate::{check_header, is_list_of, slots_are_sound};
 

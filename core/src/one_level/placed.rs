@@ -6,12 +6,30 @@
 
 use core::ops::Range;
 
-use super::spread::Spread;
 use crate::cell::CellRange;
 use crate::cell::row;
 use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
+
+/// Primitives with the cells that each belongs into. The lists hold the places of primitives.
+///
+/// The passes take a trait object, so that their code is compiled once for all that is spread. They call `place` once
+/// a batch, and `range` only for primitives that it did not place.
+pub(crate) trait Spread {
+    /// Cells per axis.
+    fn resolution(&self) -> [u32; 3];
+
+    /// Number of places where a primitive may be.
+    fn count(&self) -> u32;
+
+    /// The cells of the primitive at a place, if it has any. Every call answers the same.
+    fn range(&self, place: u32) -> Option<CellRange>;
+
+    /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
+    /// the cells that [`range`](Self::range) says.
+    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch);
+}
 
 /// The cells of a primitive: the row and the place in it of the first, and how many more there are on each axis.
 #[derive(Debug, Clone, Copy)]

@@ -13,32 +13,12 @@
 
 use core::ops::Range;
 
-use super::placed::PlacedBatch;
+use super::placed::{PlacedBatch, Spread};
 use super::slot;
 use crate::bits::set_range;
-use crate::cell::CellRange;
 use crate::control::Watch;
 use crate::error::Error;
 use crate::invariant::OrBug;
-
-/// Primitives with the cells that each belongs into. The lists hold the places of primitives.
-///
-/// The passes take a trait object, so that their code is compiled once for all that is spread. They call `place` once
-/// a batch, and `range` only for primitives that it did not place.
-pub(crate) trait Spread {
-    /// Cells per axis.
-    fn resolution(&self) -> [u32; 3];
-
-    /// Number of places where a primitive may be.
-    fn count(&self) -> u32;
-
-    /// The cells of the primitive at a place, if it has any. Every call answers the same.
-    fn range(&self, place: u32) -> Option<CellRange>;
-
-    /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
-    /// the cells that [`range`](Self::range) says.
-    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch);
-}
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
 pub(crate) fn mark(
@@ -140,7 +120,7 @@ mod tests {
 
     use super::*;
     use crate::bits::is_set;
-    use crate::cell::row;
+    use crate::cell::{CellRange, row};
     use crate::one_level::displace;
     use crate::random;
 

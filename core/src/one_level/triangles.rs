@@ -13,8 +13,7 @@ use core::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
-use super::placed::{MORE_BITS, MOST_MORE, PlacedBatch};
-use super::spread::Spread;
+use super::placed::{MORE_BITS, MOST_MORE, PlacedBatch, Spread};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice};
 use crate::eight::LANES;

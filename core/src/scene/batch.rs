@@ -5,33 +5,12 @@
 //! counters each ray is traced alone, in the order of the rays.
 
 use super::Scene;
-use super::query::{SceneHit, SceneOptions};
-use crate::batch::{Answer, Arrays, Batch, Coherence, StridedMut};
+use super::query::{SceneAnswer, SceneHit, SceneOptions};
+use crate::batch::{Arrays, Batch, Coherence, StridedMut};
 use crate::error::Error;
 use crate::mesh::Strided;
 use crate::ray::RayF64;
 use crate::simd::HAS_VECTORS;
-
-impl Answer for SceneHit {
-    const IS_ANY: bool = false;
-}
-
-/// The answer of a scene.
-pub(super) trait SceneAnswer: Answer {
-    fn of(hit: Option<SceneHit>) -> Self;
-}
-
-impl SceneAnswer for SceneHit {
-    fn of(hit: Option<SceneHit>) -> Self {
-        hit.unwrap_or(Self::MISS)
-    }
-}
-
-impl SceneAnswer for bool {
-    fn of(hit: Option<SceneHit>) -> Self {
-        hit.is_some()
-    }
-}
 
 impl Scene<'_> {
     /// The closest hit of each ray, an array of [`RayF64`]; [`SceneHit::MISS`] where there is none. The options are
@@ -115,18 +94,6 @@ fn trace<A: SceneAnswer>(
         return super::groups::trace(scene, tree, batch, coherence, options);
     }
     for place in 0..batch.count() {
-        alone(scene, batch, place, options);
+        scene.answer(batch, place, options);
     }
-}
-
-/// Answers one ray.
-#[inline(never)]
-pub(super) fn alone<A: SceneAnswer>(
-    scene: &Scene<'_>,
-    batch: &mut impl Batch<A, RayF64>,
-    place: usize,
-    options: &mut SceneOptions<'_>,
-) {
-    let hit = scene.ask(place, &batch.ray(place), options, A::IS_ANY);
-    batch.answer(place, A::of(hit));
 }

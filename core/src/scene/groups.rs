@@ -11,16 +11,15 @@
 
 use core::marker::PhantomData;
 
-use super::batch::{SceneAnswer, alone};
 use super::instance::{ObjectRay, StoredInstance};
 use super::query::{
-    InstanceSearch, QueryParameters, SceneHit, SceneOptions, ask_object, scene_hit,
+    InstanceSearch, QueryParameters, SceneAnswer, SceneHit, SceneOptions, ask_object, scene_hit,
 };
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::batch::groups::in_groups;
 use crate::batch::{Batch, Coherence};
-use crate::bvh::{Bvh, GROUP, Group, Rays, Scope, Stack, Together, lanes};
+use crate::bvh::{Bvh, GROUP, Group, GroupStack, Rays, Scope, Together, lanes};
 use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
@@ -80,7 +79,7 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for SceneBatch<'_, '_, '_, B,
     }
 
     fn alone(&mut self, place: usize) {
-        alone(self.scene, self.batch, place, self.options);
+        self.scene.answer(self.batch, place, self.options);
     }
 }
 
@@ -98,7 +97,7 @@ struct SceneRays<'r> {
     /// The `t` up to which hits of each matter.
     until: [f32; GROUP],
     inside: Rays,
-    stack: Stack,
+    stack: GroupStack,
 }
 
 impl<'r> SceneRays<'r> {
@@ -115,7 +114,7 @@ impl<'r> SceneRays<'r> {
             lanes: [0; GROUP],
             until: [0.0; GROUP],
             inside,
-            stack: Stack::new(),
+            stack: GroupStack::new(),
         }
     }
 

@@ -16,6 +16,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 use super::instance::{ObjectRay, StoredInstance};
 use super::{Object, Scene};
 use crate::approach::LineF64;
+use crate::batch::{Answer, Batch};
 use crate::counters::Counters;
 use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
@@ -55,6 +56,27 @@ impl SceneHit {
     pub fn is_closer(&self, other: &Self) -> bool {
         self.t < other.t
             || (self.t <= other.t && (self.path, self.primitive) < (other.path, other.primitive))
+    }
+}
+
+/// The answer of a scene to a ray of a batch.
+pub(super) trait SceneAnswer: Answer {
+    fn of(hit: Option<SceneHit>) -> Self;
+}
+
+impl Answer for SceneHit {
+    const IS_ANY: bool = false;
+}
+
+impl SceneAnswer for SceneHit {
+    fn of(hit: Option<SceneHit>) -> Self {
+        hit.unwrap_or(Self::MISS)
+    }
+}
+
+impl SceneAnswer for bool {
+    fn of(hit: Option<SceneHit>) -> Self {
+        hit.is_some()
     }
 }
 
@@ -141,6 +163,18 @@ impl Scene<'_> {
     /// [`occluded`](Self::occluded) with options.
     pub fn occluded_with(&self, ray: &RayF64, options: &mut SceneOptions<'_>) -> bool {
         self.ask(0, ray, options, true).is_some()
+    }
+
+    /// Answers one ray of a batch. Out of line, so that a program has its code once.
+    #[inline(never)]
+    pub(super) fn answer<A: SceneAnswer>(
+        &self,
+        batch: &mut impl Batch<A, RayF64>,
+        place: usize,
+        options: &mut SceneOptions<'_>,
+    ) {
+        let hit = self.ask(place, &batch.ray(place), options, A::IS_ANY);
+        batch.answer(place, A::of(hit));
     }
 
     /// The answer for the ray at a place of a batch.

@@ -98,19 +98,6 @@ fn trace<A: HitAnswer>(
         return super::groups::trace(shapes, tree, batch, coherence, options, test);
     }
     for place in 0..batch.count() {
-        alone(shapes, batch, place, options, test);
+        shapes.answer(batch, place, options, test);
     }
-}
-
-/// Answers one ray.
-#[inline(never)]
-pub(super) fn alone<A: HitAnswer>(
-    shapes: &Shapes<'_>,
-    batch: &mut impl Batch<A>,
-    place: usize,
-    options: &mut QueryOptions<'_>,
-    test: &mut ShapeTest<'_>,
-) {
-    let hit = shapes.search(&batch.ray(place), options, test, A::IS_ANY);
-    batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
 }

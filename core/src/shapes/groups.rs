@@ -7,7 +7,6 @@
 
 use core::marker::PhantomData;
 
-use super::batch::alone;
 use super::{ShapeTest, Shapes, hit_of};
 use crate::batch::groups::in_groups;
 use crate::batch::{Batch, Coherence, HitAnswer};
@@ -60,7 +59,7 @@ impl<A: HitAnswer, B: Batch<A>> Together for ShapesBatch<'_, '_, '_, B, A> {
     }
 
     fn alone(&mut self, place: usize) {
-        alone(self.shapes, self.batch, place, self.options, self.test);
+        self.shapes.answer(self.batch, place, self.options, self.test);
     }
 }
 

@@ -16,6 +16,7 @@ pub(crate) mod groups;
 use core::fmt;
 
 use crate::arena::Sizes;
+use crate::batch::{Batch, HitAnswer};
 use crate::config::Config;
 use crate::control::Control;
 use crate::counters::Counters;
@@ -297,6 +298,19 @@ impl<'a> Shapes<'a> {
         test: &mut ShapeTest<'_>,
     ) -> bool {
         self.search(ray, options, test, true).is_some()
+    }
+
+    /// Answers one ray of a batch. Out of line, so that a program has its code once.
+    #[inline(never)]
+    fn answer<A: HitAnswer>(
+        &self,
+        batch: &mut impl Batch<A>,
+        place: usize,
+        options: &mut QueryOptions<'_>,
+        test: &mut ShapeTest<'_>,
+    ) {
+        let hit = self.search(&batch.ray(place), options, test, A::IS_ANY);
+        batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
     }
 
     fn search(

@@ -16,7 +16,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, TriangleItem, area};
 use crate::aabb::Aabb;
-use crate::bvh::LEVELS;
+use crate::bvh::layout::LEVELS;
 use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
@@ -49,7 +49,7 @@ pub(super) struct Grow<'w> {
     pub(super) first: u32,
     /// The factor that scales lengths before areas are computed from them.
     pub(super) unit: f32,
-    /// [`least_node`](crate::bvh::build::least_node) of the scene.
+    /// [`least_node`](crate::bvh::node::least_node) of the scene.
     pub(super) least: f32,
 }
 

@@ -29,9 +29,9 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
-use super::build::{clear_header, cut_index, finish, least_node, move_nodes};
+use super::index::{clear_header, cut_index, finish, move_nodes};
 use super::layout::index_bytes;
-use super::node::Node;
+use super::node::{Node, least_node};
 use crate::aabb::Aabb;
 use crate::arena::{first_mut, move_down, section_bytes, split_mut};
 use crate::blob::Header;
