@@ -5,9 +5,9 @@ use core::ptr::NonNull;
 
 use hgrid_core::Grid;
 
+use crate::addresses::RawRegion;
 use crate::blob_types::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
 use crate::raw;
-use crate::span::Region;
 use crate::status::{
     HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status,
 };
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn hgrid_refit(
     grid: *mut hgrid_grid,
     report: *mut hgrid_refit_report,
 ) -> hgrid_status {
-    let blob = Region { start: blob, bytes: blob_bytes };
+    let blob = RawRegion { start: blob, bytes: blob_bytes };
     let call = |report: &mut hgrid_refit_report| {
         let to = NonNull::new(grid).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         // SAFETY: the caller's promise.
@@ -176,7 +176,7 @@ pub unsafe extern "C" fn hgrid_pack(
         // SAFETY: the caller's promise.
         let grid = unsafe { raw::grid(grid) }?;
         // SAFETY: the caller's promise.
-        let packed = unsafe { raw::pack(grid, Region { start: to, bytes: capacity }) };
+        let packed = unsafe { raw::pack(grid, RawRegion { start: to, bytes: capacity }) };
         if matches!(packed, Ok(()) | Err(HGRID_ERROR_INDEX_TOO_SMALL)) {
             // SAFETY: the caller's promise.
             unsafe { raw::write(size, grid.packed_bytes()) };
@@ -240,7 +240,7 @@ pub unsafe extern "C" fn hgrid_validate(
     scratch: *mut c_void,
     scratch_bytes: usize,
 ) -> hgrid_status {
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     // SAFETY: the caller's promise.
     let proof = unsafe { raw::grid(grid) }.and_then(|grid| {
         // SAFETY: the caller's promise.

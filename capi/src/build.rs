@@ -3,8 +3,8 @@
 use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
 
+use crate::addresses::RawRegion;
 use crate::raw;
-use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, hgrid_status};
 use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_report};
 
@@ -154,8 +154,8 @@ pub unsafe extern "C" fn hgrid_sizes(
     if report.is_null() {
         return HGRID_ERROR_NULL_ARGUMENT;
     }
-    let none = Region { start: null_mut(), bytes: 0 };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let none = RawRegion { start: null_mut(), bytes: 0 };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         // SAFETY: the caller's promise.
         unsafe { raw::input(mesh, config, [none, scratch]) }?.measure(report)
@@ -203,8 +203,8 @@ pub unsafe extern "C" fn hgrid_fit(
     fitted: *mut hgrid_config,
     report: *mut hgrid_report,
 ) -> hgrid_status {
-    let none = Region { start: null_mut(), bytes: 0 };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let none = RawRegion { start: null_mut(), bytes: 0 };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(fitted).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         // Require room for all fields of this version: all are written.
@@ -322,8 +322,8 @@ pub unsafe extern "C" fn hgrid_build(
     grid: *mut hgrid_grid,
     report: *mut hgrid_report,
 ) -> hgrid_status {
-    let index = Region { start: index, bytes: index_bytes };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let index = RawRegion { start: index, bytes: index_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(grid).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         // SAFETY: the caller's promise.

@@ -5,9 +5,9 @@
 //!
 //! # Ownership
 //!
-//! [`Memory`] is one allocation and frees itself when it is dropped, so that no way out of
-//! [`create`] leaks. A grid keeps one `Memory`: it contains an [`Owned`] and behind it the index.
-//! The `Owned` holds the `Memory` that it lies in, until [`hgrid_destroy`] takes the `Memory` out
+//! [`Allocation`] is one allocation and frees itself when it is dropped, so that no way out of
+//! [`create`] leaks. A grid keeps one `Allocation`: it contains an [`Owned`] and behind it the index.
+//! The `Owned` holds the `Allocation` that it lies in, until [`hgrid_destroy`] takes the `Allocation` out
 //! and drops it.
 //!
 //! "The caller's promise" in a SAFETY comment is that of `raw`, and for an allocator what
@@ -19,8 +19,8 @@
 use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
 
+use crate::addresses::RawRegion;
 use crate::raw;
-use crate::span::Region;
 use crate::status::{
     HGRID_ERROR_MISALIGNED, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OUT_OF_MEMORY,
     HGRID_ERROR_STRUCT_SIZE, hgrid_status,
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn hgrid_create(
 pub unsafe extern "C" fn hgrid_destroy(grid: *mut hgrid_grid) {
     let Some(grid) = NonNull::new(grid) else { return };
     // SAFETY: the caller's promise: `create` made it, so there is an `Owned`, and it is destroyed
-    // once, so its `Memory` is still there.
+    // once, so its `Allocation` is still there.
     drop(unsafe { grid.cast::<Owned>().read() }.memory);
 }
 
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn hgrid_destroy(grid: *mut hgrid_grid) {
 #[repr(C, align(64))]
 struct Owned {
     view: hgrid_grid,
-    memory: Memory,
+    memory: Allocation,
 }
 
 const _: () = assert!(align_of::<Owned>() == HGRID_ALIGNMENT);
@@ -163,15 +163,15 @@ unsafe fn create(
     allocator: Allocator,
     report: &mut hgrid_report,
 ) -> Result<NonNull<hgrid_grid>, hgrid_status> {
-    let none = Region { start: null_mut(), bytes: 0 };
+    let none = RawRegion { start: null_mut(), bytes: 0 };
     // Finds how much scratch is enough, and with it how much index the grid takes, to the byte.
     // SAFETY: the caller's promise.
     unsafe { raw::input(mesh, config, [none, none]) }?.measure(report)?;
-    let scratch = Memory::new(allocator, 0, report.scratch_bytes)?;
+    let scratch = Allocation::new(allocator, 0, report.scratch_bytes)?;
     // SAFETY: the caller's promise.
     unsafe { raw::input(mesh, config, [none, scratch.behind(0)]) }?.measure(report)?;
 
-    let memory = Memory::new(allocator, size_of::<Owned>(), report.index_bytes)?;
+    let memory = Allocation::new(allocator, size_of::<Owned>(), report.index_bytes)?;
     let regions = [memory.behind(size_of::<Owned>()), scratch.behind(0)];
     // SAFETY: the caller's promise.
     let built = unsafe { raw::input(mesh, config, regions) }?.build(report)?;
@@ -214,13 +214,13 @@ impl Allocator {
 }
 
 /// One allocation, given back when this is dropped. It starts at a multiple of [`HGRID_ALIGNMENT`].
-struct Memory {
+struct Allocation {
     allocator: Allocator,
     start: NonNull<c_void>,
     bytes: usize,
 }
 
-impl Memory {
+impl Allocation {
     /// Gets memory for `head` bytes and `body` more, which together are not 0.
     fn new(allocator: Allocator, head: usize, body: u64) -> Result<Self, hgrid_status> {
         let bytes = usize::try_from(body).ok().and_then(|body| body.checked_add(head));
@@ -237,13 +237,13 @@ impl Memory {
     }
 
     /// All but the first so many bytes.
-    fn behind(&self, head: usize) -> Region {
+    fn behind(&self, head: usize) -> RawRegion {
         let start = self.start.as_ptr().wrapping_byte_add(head);
-        Region { start, bytes: self.bytes.saturating_sub(head) }
+        RawRegion { start, bytes: self.bytes.saturating_sub(head) }
     }
 }
 
-impl Drop for Memory {
+impl Drop for Allocation {
     fn drop(&mut self) {
         let Self { allocator: Allocator { context, release, .. }, start, bytes } = *self;
         // SAFETY: by the promise of the one who made the allocator: what its `allocate` gave, with

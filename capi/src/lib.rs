@@ -46,6 +46,7 @@ mod status;
 mod version;
 
 // The modules behind them.
+mod addresses;
 #[cfg(all(target_arch = "arm", target_endian = "little", unix))]
 mod division;
 mod input;
@@ -53,7 +54,6 @@ mod misuse;
 mod raw;
 #[cfg(not(feature = "rlib"))]
 mod runtime;
-mod span;
 #[cfg(all(not(feature = "rlib"), debug_assertions, any(unix, windows)))]
 mod stop;
 #[cfg(feature = "malloc")]

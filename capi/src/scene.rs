@@ -6,11 +6,11 @@ use core::ptr::{NonNull, null_mut};
 
 use hgrid_core::{Cull, Instance, MAX_NESTING, Object, RayF64, SceneHit};
 
+use crate::addresses::RawRegion;
 use crate::blob_types::hgrid_refit_report;
 use crate::query_types::{cull, hgrid_counters, hgrid_verdict};
 use crate::raw;
 use crate::shapes::hgrid_shapes;
-use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::{hgrid_config, hgrid_grid, hgrid_report};
 
@@ -334,8 +334,8 @@ pub unsafe extern "C" fn hgrid_build_scene(
     scene: *mut hgrid_scene,
     report: *mut hgrid_report,
 ) -> hgrid_status {
-    let index = Region { start: index, bytes: index_bytes };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let index = RawRegion { start: index, bytes: index_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(scene).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         let (instances, objects) = ((instances, instance_count), (objects, object_count));
@@ -396,7 +396,7 @@ pub unsafe extern "C" fn hgrid_refit_scene(
     scene: *mut hgrid_scene,
     report: *mut hgrid_refit_report,
 ) -> hgrid_status {
-    let blob = Region { start: blob, bytes: blob_bytes };
+    let blob = RawRegion { start: blob, bytes: blob_bytes };
     let call = |report: &mut hgrid_refit_report| {
         let to = NonNull::new(scene).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         let (instances, objects) = ((instances, instance_count), (objects, object_count));
@@ -423,7 +423,7 @@ pub unsafe extern "C" fn hgrid_validate_scene(
     scratch: *mut c_void,
     scratch_bytes: usize,
 ) -> hgrid_status {
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     // SAFETY: the caller's promise.
     unsafe { raw::validate_scene(scene, scratch) }.err().unwrap_or(HGRID_OK)
 }
@@ -457,7 +457,7 @@ pub unsafe extern "C" fn hgrid_pack_scene(
 ) -> hgrid_status {
     let Some(size) = NonNull::new(bytes) else { return HGRID_ERROR_NULL_ARGUMENT };
     // SAFETY: the caller's promise.
-    let packed = unsafe { raw::pack_scene(scene, Region { start: to, bytes: capacity }, size) };
+    let packed = unsafe { raw::pack_scene(scene, RawRegion { start: to, bytes: capacity }, size) };
     packed.err().unwrap_or(HGRID_OK)
 }
 
@@ -497,8 +497,8 @@ pub unsafe extern "C" fn hgrid_open_packed_scene(
     else {
         return HGRID_ERROR_NULL_ARGUMENT;
     };
-    let views = Region { start: views, bytes: views_bytes };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let views = RawRegion { start: views, bytes: views_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     // SAFETY: the caller's promise.
     let opened = unsafe { raw::open_packed_scene((blob, blob_bytes), [views, scratch], size, to) };
     opened.err().unwrap_or(HGRID_OK)

@@ -6,11 +6,11 @@ use core::ptr::NonNull;
 
 use hgrid_core::{QueryOptions, ShapeHit, ShapeTest, Shapes};
 
+use crate::addresses::RawRegion;
 use crate::blob_types::hgrid_refit_report;
 use crate::query_types::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
 use crate::raw;
 use crate::raw::BatchArrays;
-use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::{hgrid_config, hgrid_report};
 
@@ -118,8 +118,8 @@ pub unsafe extern "C" fn hgrid_build_shapes(
     shapes: *mut hgrid_shapes,
     report: *mut hgrid_report,
 ) -> hgrid_status {
-    let index = Region { start: index, bytes: index_bytes };
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let index = RawRegion { start: index, bytes: index_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(shapes).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         // SAFETY: the caller's promise.
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn hgrid_refit_shapes(
     shapes: *mut hgrid_shapes,
     report: *mut hgrid_refit_report,
 ) -> hgrid_status {
-    let blob = Region { start: blob, bytes: blob_bytes };
+    let blob = RawRegion { start: blob, bytes: blob_bytes };
     let call = |report: &mut hgrid_refit_report| {
         let to = NonNull::new(shapes).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
         // SAFETY: the caller's promise.
@@ -196,7 +196,7 @@ pub unsafe extern "C" fn hgrid_validate_shapes(
     scratch: *mut c_void,
     scratch_bytes: usize,
 ) -> hgrid_status {
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
     // SAFETY: the caller's promise.
     unsafe { raw::validate_shapes(shapes, scratch) }.err().unwrap_or(HGRID_OK)
 }

@@ -180,12 +180,12 @@ impl fmt::Debug for OwnedMesh {
 }
 
 /// A region on the heap.
-struct Memory {
+struct HeapRegion {
     bytes: Vec<u8>,
     length: usize,
 }
 
-impl Memory {
+impl HeapRegion {
     /// Zeros, or an error where there is no memory.
     fn new(length: usize, region: Region) -> Result<Self, Error> {
         let missing =
@@ -244,7 +244,7 @@ impl Memory {
 /// ```
 pub struct OwnedGrid {
     mesh: OwnedMesh,
-    index: Memory,
+    index: HeapRegion,
 }
 
 impl OwnedGrid {
@@ -267,13 +267,13 @@ impl OwnedGrid {
     ) -> Result<Self, Error> {
         let view = mesh.try_view()?;
         let mut sizes = sizes_with(&view, config, &mut [], control)?;
-        let mut scratch = Memory::new(sizes.scratch_bytes, Region::Scratch)?;
+        let mut scratch = HeapRegion::new(sizes.scratch_bytes, Region::Scratch)?;
         // A tree's bound is about twice what it takes, and only what it takes is touched. The bounds of other
         // methods may exceed the memory: compute the exact size.
         if config.method() != Method::Bvh {
             sizes = sizes_with(&view, config, scratch.bytes_mut(), control)?;
         }
-        let mut index = Memory::new(sizes.index_bytes, Region::Index)?;
+        let mut index = HeapRegion::new(sizes.index_bytes, Region::Index)?;
         let (to, scratch_bytes) = (index.bytes_mut(), scratch.bytes_mut());
         let bytes = Grid::build_with(view, config, to, scratch_bytes, control)?.blob_bytes();
         drop(scratch);
@@ -286,7 +286,7 @@ impl OwnedGrid {
     /// # Errors
     /// The errors of [`Grid::open`]; [`Error::OutOfMemory`] as of [`build`](Self::build).
     pub fn open(blob: &[u8], mesh: OwnedMesh) -> Result<Self, Error> {
-        let mut index = Memory::new(blob.len(), Region::Index)?;
+        let mut index = HeapRegion::new(blob.len(), Region::Index)?;
         index.bytes_mut().copy_from_slice(blob);
         let bytes = Grid::open(index.bytes(), mesh.try_view()?)?.blob_bytes();
         index.shrink(bytes);

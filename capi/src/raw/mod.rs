@@ -1,6 +1,6 @@
-//! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in `ask` for
-//! queries, in `join` for arrays of meshes, in `shapes` and `scene` for those. (`create` reads the head of a region,
-//! which it wrote itself.) `batch_arrays` checks the addresses of a batch before it reads them.
+//! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in `query` for
+//! queries, in `parts` for arrays of meshes, in `shapes` and `scene` for those. (`create` reads the head of a region,
+//! which it wrote itself.) `batch` checks the addresses of a batch before it reads them.
 //!
 //! # The contract with C
 //!
@@ -25,9 +25,9 @@
 //! "as long as the caller says": blob and mesh stay unchanged while the view is in use, and between
 //! calls nothing here looks at them.
 
-mod ask;
-mod batch_arrays;
-mod join;
+mod batch;
+mod parts;
+mod query;
 mod scene;
 mod shapes;
 
@@ -37,9 +37,9 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-pub(crate) use ask::{batch, closest, locate, query, query_all, surface};
-pub(crate) use batch_arrays::{BatchArrays, RunningBatch};
-pub(crate) use join::{join, parts_of};
+pub(crate) use batch::{BatchArrays, RunningBatch};
+pub(crate) use parts::{join, parts_of};
+pub(crate) use query::{batch, closest, locate, query, query_all, surface};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,
     scene_batch, scene_locate, scene_normal, scene_surface, validate_scene, write_object,
@@ -48,9 +48,9 @@ pub(crate) use shapes::{
     build_shapes, open_shapes, query_shapes, refit_shapes, shapes, shapes_batch, validate_shapes,
 };
 
+use crate::addresses::{Addresses, RawRegion};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::Input;
-use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
     HGRID_ERROR_STRUCT_SIZE, HGRID_OK, hgrid_status, status_of,
@@ -67,7 +67,7 @@ const MAX_STRUCT_SIZE: usize = 4096;
 
 /// The content of a [`hgrid_grid`].
 #[repr(C)]
-struct View {
+struct StoredGrid {
     tag: u64,
     grid: Grid<'static>,
 }
@@ -75,8 +75,8 @@ struct View {
 /// The tag of a view that a build or an open has written.
 const VIEW_TAG: u64 = u64::from_le_bytes(*b"hgridvw1");
 
-const _: () = assert!(size_of::<View>() <= size_of::<hgrid_grid>());
-const _: () = assert!(align_of::<View>() <= align_of::<hgrid_grid>());
+const _: () = assert!(size_of::<StoredGrid>() <= size_of::<hgrid_grid>());
+const _: () = assert!(align_of::<StoredGrid>() <= align_of::<hgrid_grid>());
 
 /// Reads a number or a small struct.
 ///
@@ -165,11 +165,11 @@ unsafe fn bytes_mut(start: *mut c_void, count: usize) -> Result<&'static mut [u8
 /// # Safety
 /// The caller's promise.
 unsafe fn apart<const N: usize>(
-    inputs: [Span; N],
-    [one, other]: [Region; 2],
+    inputs: [Addresses; N],
+    [one, other]: [RawRegion; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let (first, second) = (one.span(), other.span());
-    let is_shared = |input: &Span| input.overlaps(first) || input.overlaps(second);
+    let (first, second) = (one.addresses(), other.addresses());
+    let is_shared = |input: &Addresses| input.overlaps(first) || input.overlaps(second);
     if first.overlaps(second) || inputs.iter().any(is_shared) {
         return Err(HGRID_ERROR_OVERLAP);
     }
@@ -187,7 +187,7 @@ unsafe fn apart<const N: usize>(
 unsafe fn mesh(mesh: &hgrid_mesh) -> Result<TriangleMesh<'static>, hgrid_status> {
     if mesh.has_parts() {
         // SAFETY: the caller's promise.
-        return unsafe { join::joined(mesh) };
+        return unsafe { parts::joined(mesh) };
     }
     let [positions, indices] = [mesh.position_elements()?, mesh.index_elements()?];
     let masks = mesh.mask_elements()?;
@@ -301,11 +301,11 @@ unsafe extern "C" fn call(task_context: *mut c_void, index: u32) {
 /// The caller's promise.
 unsafe fn regions(
     mesh: &TriangleMesh<'_>,
-    [index, scratch]: [Region; 2],
+    [index, scratch]: [RawRegion; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let [index_span, scratch_span] = [index.span(), scratch.span()];
-    let is_shared = shares(mesh, index_span) || shares(mesh, scratch_span);
-    if index_span.overlaps(scratch_span) || is_shared {
+    let [of_index, of_scratch] = [index.addresses(), scratch.addresses()];
+    let is_shared = shares(mesh, of_index) || shares(mesh, of_scratch);
+    if of_index.overlaps(of_scratch) || is_shared {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
@@ -322,7 +322,7 @@ unsafe fn regions(
 pub(crate) unsafe fn input(
     description: *const hgrid_mesh,
     settings: *const hgrid_config,
-    memory: [Region; 2],
+    memory: [RawRegion; 2],
 ) -> Result<Input, hgrid_status> {
     // SAFETY: the caller's promise.
     let description = unsafe { read_sized(description) }?;
@@ -364,7 +364,7 @@ pub(crate) unsafe fn open(
 /// The caller's promise.
 pub(crate) unsafe fn refit(
     description: *const hgrid_mesh,
-    blob: Region,
+    blob: RawRegion,
     report: &mut hgrid_refit_report,
 ) -> Result<Grid<'static>, hgrid_status> {
     if blob.start.is_null() {
@@ -375,7 +375,7 @@ pub(crate) unsafe fn refit(
     // SAFETY: the caller's promise.
     let mesh = unsafe { mesh(&description) }?;
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { regions(&mesh, [blob, Region::NONE]) }?;
+    let [blob, _] = unsafe { regions(&mesh, [blob, RawRegion::NONE]) }?;
     let refitted = hgrid_core::refit(blob, &mesh);
     report.note(&refitted);
     refitted.and_then(|_| Grid::open(blob, mesh)).map_err(status_of)
@@ -420,7 +420,7 @@ pub(crate) unsafe fn peek(
 ///
 /// # Safety
 /// The contract of [`grid`].
-pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_status> {
+pub(crate) unsafe fn pack(grid: &Grid<'_>, to: RawRegion) -> Result<(), hgrid_status> {
     // SAFETY: the caller's promise.
     let to = unsafe { bytes_beside(grid, to) }?;
     grid.pack(to).map(|_| ()).map_err(status_of)
@@ -430,34 +430,34 @@ pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_statu
 ///
 /// # Safety
 /// The contract of [`grid`].
-pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: Region) -> Result<(), hgrid_status> {
+pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: RawRegion) -> Result<(), hgrid_status> {
     // SAFETY: the caller's promise.
     let scratch = unsafe { bytes_beside(grid, scratch) }?;
     grid.validate(scratch).map_err(status_of)
 }
 
-/// Returns the span of some bytes.
-fn span_of(bytes: &[u8]) -> Span {
-    Span::new(bytes.as_ptr().cast(), bytes.len())
+/// Returns the addresses of some bytes.
+fn addresses_of(bytes: &[u8]) -> Addresses {
+    Addresses::new(bytes.as_ptr().cast(), bytes.len())
 }
 
-/// Returns the span of a view.
-fn view_of<T: ?Sized>(view: &T) -> Span {
-    Span::new(core::ptr::from_ref(view).cast(), size_of_val(view))
+/// Returns the addresses of a view.
+fn addresses_of_view<T: ?Sized>(view: &T) -> Addresses {
+    Addresses::new(core::ptr::from_ref(view).cast(), size_of_val(view))
 }
 
-/// Returns true if a mesh reads something that lies in a span.
-fn shares(mesh: &TriangleMesh<'_>, span: Span) -> bool {
+/// Returns true if a mesh reads something that lies in a range of addresses.
+fn shares(mesh: &TriangleMesh<'_>, addresses: Addresses) -> bool {
     let has = |mesh: &TriangleMesh<'_>| {
         let arrays = [mesh.positions(), mesh.triangles(), mesh.masks()];
-        arrays.into_iter().any(|array| span_of(array.bytes).overlaps(span))
+        arrays.into_iter().any(|array| addresses_of(array.bytes).overlaps(addresses))
     };
-    if span.is_empty() {
+    if addresses.is_empty() {
         return false;
     }
     has(mesh)
-        || span_of(mesh.numbering().as_flattened()).overlaps(span)
-        || join::span_of(mesh).overlaps(span)
+        || addresses_of(mesh.numbering().as_flattened()).overlaps(addresses)
+        || parts::addresses_of(mesh).overlaps(addresses)
         || mesh.parts().iter().any(|part| has(part.mesh()))
 }
 
@@ -465,8 +465,9 @@ fn shares(mesh: &TriangleMesh<'_>, span: Span) -> bool {
 ///
 /// # Safety
 /// The contract of [`grid`].
-unsafe fn bytes_beside(grid: &Grid<'_>, to: Region) -> Result<&'static mut [u8], hgrid_status> {
-    let is_shared = span_of(grid.blob()).overlaps(to.span()) || shares(grid.mesh(), to.span());
+unsafe fn bytes_beside(grid: &Grid<'_>, to: RawRegion) -> Result<&'static mut [u8], hgrid_status> {
+    let is_shared =
+        addresses_of(grid.blob()).overlaps(to.addresses()) || shares(grid.mesh(), to.addresses());
     if is_shared {
         return Err(HGRID_ERROR_OVERLAP);
     }
@@ -481,7 +482,7 @@ unsafe fn bytes_beside(grid: &Grid<'_>, to: Region) -> Result<&'static mut [u8],
 /// one that was, and its blob and its mesh are where they were.
 #[inline(always)]
 pub(crate) unsafe fn grid<'a>(grid: *const hgrid_grid) -> Result<&'a Grid<'static>, hgrid_status> {
-    let view = grid.cast::<View>();
+    let view = grid.cast::<StoredGrid>();
     // SAFETY: the caller's promise; the tag comes first.
     if unsafe { read(view.cast::<u64>()) }? != VIEW_TAG {
         return Err(HGRID_ERROR_NOT_A_GRID);
@@ -497,7 +498,7 @@ pub(crate) unsafe fn grid<'a>(grid: *const hgrid_grid) -> Result<&'a Grid<'stati
 /// The caller's promise.
 pub(crate) unsafe fn write_grid(to: NonNull<hgrid_grid>, grid: &Grid<'static>) {
     // SAFETY: large enough and aligned as the assertions above say.
-    unsafe { write(to.cast(), View { tag: VIEW_TAG, grid: *grid }) }
+    unsafe { write(to.cast(), StoredGrid { tag: VIEW_TAG, grid: *grid }) }
 }
 
 /// Runs a call that fills a report, which may be NULL.

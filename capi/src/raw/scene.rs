@@ -12,12 +12,14 @@ use hgrid_core::{
     SceneOptions, SceneSurface, Verdict,
 };
 
-use super::ask::add;
-use super::batch_arrays::{BatchArrays, RunningBatch};
+use super::batch::{BatchArrays, RunningBatch};
+use super::query::add;
 use super::shapes::shapes_read;
 use super::{
-    apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, view_of, write, write_grid,
+    addresses_of, addresses_of_view, apart, bytes, bytes_mut, config, read, read_sized, shares,
+    write, write_grid,
 };
+use crate::addresses::{Addresses, RawRegion};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
 use crate::misuse::{CallersRay as _, checked};
@@ -25,7 +27,6 @@ use crate::query_types::{hgrid_counters, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };
-use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_MISALIGNED, HGRID_ERROR_NOT_A_GRID,
     HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OTHER_CONTENT, HGRID_ERROR_OVERLAP,
@@ -77,16 +78,16 @@ unsafe fn objects(
 /// The caller's promise.
 unsafe fn instances(
     (start, count): (*const hgrid_instance, usize),
-) -> Result<(&'static [Instance], Span), hgrid_status> {
+) -> Result<(&'static [Instance], Addresses), hgrid_status> {
     let all = Elements::new(start.cast(), 0, count, size_of::<hgrid_instance>());
     let all = all.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?;
-    let span = Span::new(all.start, all.bytes);
+    let addresses = Addresses::new(all.start, all.bytes);
     if start.is_null() {
-        return if count == 0 { Ok((&[], span)) } else { Err(HGRID_ERROR_NULL_ARGUMENT) };
+        return if count == 0 { Ok((&[], addresses)) } else { Err(HGRID_ERROR_NULL_ARGUMENT) };
     }
     // SAFETY: not NULL, so aligned and readable by the caller's promise; any bytes are an instance, which is laid out
     // as `hgrid_instance`.
-    Ok((unsafe { slice::from_raw_parts(start.cast(), count) }, span))
+    Ok((unsafe { slice::from_raw_parts(start.cast(), count) }, addresses))
 }
 
 /// Writes a view of a scene.
@@ -122,18 +123,18 @@ pub(crate) unsafe fn build_scene(
     given: (*const hgrid_instance, usize),
     shown: (*const hgrid_object, usize),
     settings: *const hgrid_config,
-    memory: [Region; 2],
+    memory: [RawRegion; 2],
     to: NonNull<hgrid_scene>,
     report: &mut hgrid_report,
 ) -> Result<(), hgrid_status> {
     // SAFETY: the caller's promise.
-    let (instances, span) = unsafe { instances(given) }?;
+    let (instances, addresses) = unsafe { instances(given) }?;
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
     // SAFETY: the caller's promise.
     let (config, caller) = unsafe { config(settings) }?;
     // SAFETY: the caller's promise.
-    let [index, scratch] = unsafe { apart_from(span, objects, memory) }?;
+    let [index, scratch] = unsafe { apart_from(addresses, objects, memory) }?;
     let built = controlled(caller, |control| {
         Scene::build_with(instances, objects, &config, index, scratch, control)
     });
@@ -173,7 +174,7 @@ pub(crate) unsafe fn open_scene(
 pub(crate) unsafe fn refit_scene(
     given: (*const hgrid_instance, usize),
     shown: (*const hgrid_object, usize),
-    blob: Region,
+    blob: RawRegion,
     to: NonNull<hgrid_scene>,
     report: &mut hgrid_refit_report,
 ) -> Result<(), hgrid_status> {
@@ -181,11 +182,11 @@ pub(crate) unsafe fn refit_scene(
         return Err(HGRID_ERROR_NULL_ARGUMENT);
     }
     // SAFETY: the caller's promise.
-    let (instances, span) = unsafe { instances(given) }?;
+    let (instances, addresses) = unsafe { instances(given) }?;
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { apart_from(span, objects, [blob, Region::NONE]) }?;
+    let [blob, _] = unsafe { apart_from(addresses, objects, [blob, RawRegion::NONE]) }?;
     let refitted = Scene::refit(blob, instances, objects);
     report.note(&refitted);
     let opened = refitted.and_then(|_| Scene::open(blob, objects)).map_err(status_of)?;
@@ -200,11 +201,11 @@ pub(crate) unsafe fn refit_scene(
 /// The contract of [`scene`].
 pub(crate) unsafe fn validate_scene(
     view: *const hgrid_scene,
-    scratch: Region,
+    scratch: RawRegion,
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
-    if !scratch.span().is_empty() && reads(scene, scratch.span()) {
+    if !scratch.addresses().is_empty() && reads(scene, scratch.addresses()) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.
@@ -212,32 +213,34 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
-/// Returns true if a scene reads something that lies in a span.
-fn reads(scene: &Scene<'_>, span: Span) -> bool {
+/// Returns true if a scene reads something that lies in a range of addresses.
+fn reads(scene: &Scene<'_>, addresses: Addresses) -> bool {
     let within = |object: &Object<'_>| match object {
-        Object::Scene(inner) => reads(inner, span),
-        _ => touches(object, span),
+        Object::Scene(inner) => reads(inner, addresses),
+        _ => touches(object, addresses),
     };
-    holds(scene, span) || scene.objects().iter().any(within)
+    holds(scene, addresses) || scene.objects().iter().any(within)
 }
 
-/// Returns true if a view of a scene, its blob or its array of objects lies in a span.
-fn holds(scene: &Scene<'_>, span: Span) -> bool {
-    view_of(scene).overlaps(span)
-        || span_of(scene.blob()).overlaps(span)
-        || view_of(scene.objects()).overlaps(span)
+/// Returns true if a view of a scene, its blob or its array of objects lies in a range of addresses.
+fn holds(scene: &Scene<'_>, addresses: Addresses) -> bool {
+    addresses_of_view(scene).overlaps(addresses)
+        || addresses_of(scene.blob()).overlaps(addresses)
+        || addresses_of_view(scene.objects()).overlaps(addresses)
 }
 
-/// Returns true if something of an object lies in a span, but for what a scene shows.
-fn touches(object: &Object<'_>, span: Span) -> bool {
+/// Returns true if something of an object lies in a range of addresses, but for what a scene shows.
+fn touches(object: &Object<'_>, addresses: Addresses) -> bool {
     match object {
         Object::Grid(grid) => {
-            view_of(*grid).overlaps(span)
-                || span_of(grid.blob()).overlaps(span)
-                || shares(grid.mesh(), span)
+            addresses_of_view(*grid).overlaps(addresses)
+                || addresses_of(grid.blob()).overlaps(addresses)
+                || shares(grid.mesh(), addresses)
         }
-        Object::Scene(inner) => holds(inner, span),
-        Object::Shapes(shapes, test) => view_of(*test).overlaps(span) || shapes_read(shapes, span),
+        Object::Scene(inner) => holds(inner, addresses),
+        Object::Shapes(shapes, test) => {
+            addresses_of_view(*test).overlaps(addresses) || shapes_read(shapes, addresses)
+        }
         Object::Nothing => false,
     }
 }
@@ -249,17 +252,18 @@ fn touches(object: &Object<'_>, span: Span) -> bool {
 /// # Safety
 /// The caller's promise.
 unsafe fn apart_from(
-    instances: Span,
+    instances: Addresses,
     objects: &[Object<'_>],
-    regions: [Region; 2],
+    regions: [RawRegion; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let written = regions.map(Region::span);
-    let is_shared = |object: &Object<'_>| written.iter().any(|&span| touches(object, span));
+    let written = regions.map(RawRegion::addresses);
+    let is_shared =
+        |object: &Object<'_>| written.iter().any(|&addresses| touches(object, addresses));
     if objects.iter().any(is_shared) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise.
-    unsafe { apart([instances, view_of(objects)], regions) }
+    unsafe { apart([instances, addresses_of_view(objects)], regions) }
 }
 
 /// Writes a scene and all that it shows.
@@ -268,12 +272,12 @@ unsafe fn apart_from(
 /// The contract of [`scene`].
 pub(crate) unsafe fn pack_scene(
     view: *const hgrid_scene,
-    to: Region,
+    to: RawRegion,
     size: NonNull<u64>,
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
-    if !to.span().is_empty() && reads(scene, to.span()) {
+    if !to.addresses().is_empty() && reads(scene, to.addresses()) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.
@@ -292,12 +296,12 @@ pub(crate) unsafe fn pack_scene(
 /// The caller's promise.
 pub(crate) unsafe fn open_packed_scene(
     blob: (*const c_void, usize),
-    [views, scratch]: [Region; 2],
+    [views, scratch]: [RawRegion; 2],
     size: NonNull<u64>,
     to: NonNull<hgrid_scene>,
 ) -> Result<(), hgrid_status> {
     let is_proven = !scratch.start.is_null();
-    let span = Span::new(blob.0, blob.1);
+    let addresses = Addresses::new(blob.0, blob.1);
     // SAFETY: the caller's promise.
     let blob = unsafe { bytes(blob.0, blob.1) }?;
     let is_aligned =
@@ -310,7 +314,7 @@ pub(crate) unsafe fn open_packed_scene(
         return Err(HGRID_ERROR_OTHER_CONTENT);
     }
     // SAFETY: the caller's promise.
-    let [room, scratch] = unsafe { apart([span], [views, scratch]) }?;
+    let [room, scratch] = unsafe { apart([addresses], [views, scratch]) }?;
     if !is_aligned(room) {
         return Err(HGRID_ERROR_MISALIGNED);
     }
@@ -458,9 +462,9 @@ pub(crate) unsafe fn scene_batch<T>(
     // SAFETY: the caller's promise.
     let asked = unsafe { SceneAsked::read(asked) }?;
     let hgrid_scene_options { scratch, scratch_bytes, .. } = asked.options;
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
-    let span = scratch.span();
-    if batch.overlaps(span) || !span.is_empty() && reads(scene, span) {
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
+    let addresses = scratch.addresses();
+    if batch.overlaps(addresses) || !addresses.is_empty() && reads(scene, addresses) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.

@@ -7,15 +7,18 @@ use core::ptr::NonNull;
 
 use hgrid_core::{Boxes, Hit, ObjectTest, QueryOptions, Ray, ShapeHit, Shapes, Sizes};
 
-use super::ask::all_options;
-use super::batch_arrays::{BatchArrays, RunningBatch};
-use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, view_of, write};
+use super::batch::{BatchArrays, RunningBatch};
+use super::query::all_options;
+use super::{
+    addresses_of, addresses_of_view, apart, bytes, bytes_mut, config, read, read_sized, strided,
+    write,
+};
+use crate::addresses::{Addresses, RawRegion};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
 use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{hgrid_query_options, hgrid_ray};
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
-use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_POSITIONS, HGRID_ERROR_NOT_A_GRID,
     HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP, HGRID_ERROR_STRUCT_SIZE, hgrid_status,
@@ -24,7 +27,7 @@ use crate::status::{
 use crate::types::{Elements, hgrid_config, hgrid_report};
 
 /// The test of [`hgrid_boxes`].
-type ShapeTest =
+type CShapeTest =
     unsafe extern "C" fn(*mut c_void, u32, *const hgrid_ray, *mut hgrid_shape_hit) -> bool;
 
 /// The contents of a [`hgrid_shapes`].
@@ -32,7 +35,7 @@ type ShapeTest =
 pub(crate) struct Tested {
     tag: u64,
     pub(crate) shapes: Shapes<'static>,
-    test: Option<ShapeTest>,
+    test: Option<CShapeTest>,
     context: *mut c_void,
 }
 
@@ -118,7 +121,7 @@ pub(crate) unsafe fn shapes<'a>(view: *const hgrid_shapes) -> Result<&'a Tested,
 pub(crate) unsafe fn build_shapes(
     description: *const hgrid_boxes,
     settings: *const hgrid_config,
-    memory: [Region; 2],
+    memory: [RawRegion; 2],
     to: NonNull<hgrid_shapes>,
     report: &mut hgrid_report,
 ) -> Result<(), hgrid_status> {
@@ -128,7 +131,7 @@ pub(crate) unsafe fn build_shapes(
     let boxes = unsafe { boxes(&description) }?;
     // SAFETY: the caller's promise.
     let (config, caller) = unsafe { config(settings) }?;
-    let inputs = elements(&description)?.map(|array| Span::new(array.start, array.bytes));
+    let inputs = elements(&description)?.map(|array| Addresses::new(array.start, array.bytes));
     // SAFETY: the caller's promise.
     let [index, scratch] = unsafe { apart(inputs, memory) }?;
     let built =
@@ -171,7 +174,7 @@ pub(crate) unsafe fn open_shapes(
 /// The caller's promise.
 pub(crate) unsafe fn refit_shapes(
     description: *const hgrid_boxes,
-    blob: Region,
+    blob: RawRegion,
     to: NonNull<hgrid_shapes>,
     report: &mut hgrid_refit_report,
 ) -> Result<(), hgrid_status> {
@@ -182,9 +185,9 @@ pub(crate) unsafe fn refit_shapes(
     let description = unsafe { read_sized(description) }?;
     // SAFETY: the caller's promise.
     let boxes = unsafe { boxes(&description) }?;
-    let inputs = elements(&description)?.map(|array| Span::new(array.start, array.bytes));
+    let inputs = elements(&description)?.map(|array| Addresses::new(array.start, array.bytes));
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { apart(inputs, [blob, Region::NONE]) }?;
+    let [blob, _] = unsafe { apart(inputs, [blob, RawRegion::NONE]) }?;
     let refitted = Shapes::refit(blob, &boxes);
     report.note(&refitted);
     let opened = refitted.and_then(|_| Shapes::open(blob, boxes)).map_err(status_of)?;
@@ -199,11 +202,13 @@ pub(crate) unsafe fn refit_shapes(
 /// The contract of [`shapes`].
 pub(crate) unsafe fn validate_shapes(
     view: *const hgrid_shapes,
-    scratch: Region,
+    scratch: RawRegion,
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let tested = unsafe { shapes(view) }?;
-    if !scratch.span().is_empty() && span_of(tested.shapes.blob()).overlaps(scratch.span()) {
+    if !scratch.addresses().is_empty()
+        && addresses_of(tested.shapes.blob()).overlaps(scratch.addresses())
+    {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.
@@ -242,11 +247,11 @@ pub(crate) unsafe fn query_shapes(
     }
 }
 
-/// Returns true if blob or boxes of a tree of shapes lie in a span.
-pub(super) fn shapes_read(shapes: &Shapes<'_>, span: Span) -> bool {
+/// Returns true if blob or boxes of a tree of shapes lie in a range of addresses.
+pub(super) fn shapes_read(shapes: &Shapes<'_>, addresses: Addresses) -> bool {
     let boxes = shapes.boxes();
     let arrays = [shapes.blob(), boxes.corners().bytes, boxes.masks().bytes];
-    arrays.iter().any(|array| span_of(array).overlaps(span))
+    arrays.iter().any(|array| addresses_of(array).overlaps(addresses))
 }
 
 /// Asks a tree of shapes for many rays: `trace` gets them as core asks for them, the caller's options, and the test.
@@ -276,10 +281,12 @@ pub(crate) unsafe fn shapes_batch<T>(
         return Ok(());
     };
     let hgrid_query_options { scratch, scratch_bytes, .. } = asked.options;
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
-    let span = scratch.span();
-    if batch.overlaps(span)
-        || !span.is_empty() && (view_of(tested).overlaps(span) || shapes_read(&tested.shapes, span))
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
+    let addresses = scratch.addresses();
+    if batch.overlaps(addresses)
+        || !addresses.is_empty()
+            && (addresses_of_view(tested).overlaps(addresses)
+                || shapes_read(&tested.shapes, addresses))
     {
         return Err(HGRID_ERROR_OVERLAP);
     }

@@ -28,10 +28,10 @@ use crate::scene::{Object, Scene};
 
 /// Room for the view of a grid or scene that a packed scene holds: [`Scene::open_packed`] fills it.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Member<'a>(View<'a>);
+pub struct Member<'a>(MemberView<'a>);
 
 #[derive(Debug, Clone, Copy, Default)]
-enum View<'a> {
+enum MemberView<'a> {
     #[default]
     Nothing,
     Grid(Grid<'a>),
@@ -40,15 +40,15 @@ enum View<'a> {
 
 impl Member<'_> {
     /// Room that nothing is in yet.
-    pub const EMPTY: Self = Self(View::Nothing);
+    pub const EMPTY: Self = Self(MemberView::Nothing);
 }
 
 impl<'a> Member<'a> {
     const fn object(&'a self) -> Object<'a> {
         match &self.0 {
-            View::Nothing => Object::Nothing,
-            View::Grid(grid) => Object::Grid(grid),
-            View::Scene(scene) => Object::Scene(scene),
+            MemberView::Nothing => Object::Nothing,
+            MemberView::Grid(grid) => Object::Grid(grid),
+            MemberView::Scene(scene) => Object::Scene(scene),
         }
     }
 }
@@ -328,7 +328,7 @@ impl<'a> Scene<'a> {
                     if let Some(scratch) = &mut proof {
                         grid.validate(scratch).map_err(inside)?;
                     }
-                    View::Grid(grid)
+                    MemberView::Grid(grid)
                 }
                 Content::Instances => {
                     let shown = Self::named_in(own.0).map_err(inside)?;
@@ -348,7 +348,7 @@ impl<'a> Scene<'a> {
                     if let Some(scratch) = &mut proof {
                         scene.validate(scratch).map_err(inside)?;
                     }
-                    View::Scene(scene)
+                    MemberView::Scene(scene)
                 }
                 content => return Err(Error::OtherContent(content)),
             };
@@ -359,7 +359,7 @@ impl<'a> Scene<'a> {
                 if let Some(entry) = table.get_mut(number as usize) {
                     *entry = to.object();
                 }
-            } else if let View::Scene(scene) = view {
+            } else if let MemberView::Scene(scene) = view {
                 let whole = Header::peek(scene.blob())?.holding(count, references, needed_bytes);
                 let is_all = rest.is_empty() && numbers.is_empty();
                 return if is_all && whole.to_bytes() == header.to_bytes() {

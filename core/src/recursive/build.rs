@@ -402,6 +402,7 @@ impl Builder<'_, '_> {
         }
 
         if depth > 0 {
+            debug_assert!(looked <= *looks, "more looks than there were");
             *looks = looks.saturating_sub(looked);
         }
 
@@ -454,12 +455,14 @@ impl Builder<'_, '_> {
             let start = self.pool.offset()?;
             let is_crowded = list.len() > FEW && depth + 1 < self.rule.depth;
             let share = (*looks).checked_div(later).unwrap_or(0) * list.len() as u64;
+            debug_assert!(list.len() as u64 <= later, "longer lists than references");
             later = later.saturating_sub(list.len() as u64);
             let mut left = share;
             let is_grid = is_crowded && {
                 let bounds = self.inside(&node, cell, list);
                 self.grid(list, &bounds, depth + 1, &mut left, rest)?
             };
+            debug_assert!(share - left <= *looks, "more looks than there were");
             *looks = looks.saturating_sub(share - left);
             if is_grid {
                 entry(number, start | GRID);

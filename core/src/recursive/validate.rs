@@ -26,7 +26,7 @@ type CellOfGrid = (GridNode, [u32; 3]);
 const LEVELS: usize = MAX_DEPTH as usize;
 
 /// The state of a check.
-struct Check<'a> {
+struct ListChecks<'a> {
     pool: &'a [u32],
     mesh: &'a TriangleMesh<'a>,
     lattice: &'a Lattice,
@@ -76,7 +76,7 @@ impl Recursive<'_> {
         header.check(lattice, mesh, |size, count| {
             rule.resolution(size.to_array().map(f64::from), count, 0)
         })?;
-        let mut check = Check {
+        let mut check = ListChecks {
             pool: self.pool,
             mesh,
             lattice,
@@ -92,7 +92,7 @@ impl Recursive<'_> {
         }
         check.grid(&root, 0)?;
         if check.cursor != self.pool.len() {
-            return Err(Check::wrong(check.cursor));
+            return Err(ListChecks::wrong(check.cursor));
         }
         let mut expected = 0;
         for id in 0..mesh.triangle_count() {
@@ -107,7 +107,7 @@ impl Recursive<'_> {
     }
 }
 
-impl Check<'_> {
+impl ListChecks<'_> {
     /// The error for a grid whose words start here.
     fn wrong(at: usize) -> Error {
         corrupt(HEADER_BYTES + at * size_of::<u32>())

@@ -206,6 +206,7 @@ fn run(
     let Lists { hash, references, owners, rest } = lists;
     fill(&MeshSpread::new(mesh, &plan.lattice), offsets, hash, references, &Watch::none())?;
     watch.at(0.5)?;
+    debug_assert!(hash.is_sorted(), "a list that ends before it starts");
     let longest = pairs(hash).map(|(start, end)| end.wrapping_sub(start)).max().unwrap_or(0);
     // Arrays in which one subgrid after the other is planned.
     let mut bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
@@ -304,6 +305,10 @@ impl CellSpread<'_> {
         };
         let rows = bench.row_offsets.get(..sections.row_offsets.len());
         let rows = rows.or_bug("more rows than on the bench").unwrap_or_default();
+        debug_assert!(
+            sections.domain_bits.len() <= 2 * bench.domain_bits.len(),
+            "more bits than on the bench"
+        );
         for (to, from) in sections.row_offsets.iter_mut().zip(rows) {
             *to = from.cast_unsigned();
         }

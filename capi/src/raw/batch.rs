@@ -9,7 +9,7 @@ use core::ffi::c_void;
 
 use hgrid_core::Batch;
 
-use crate::span::Span;
+use crate::addresses::Addresses;
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_INVALID_RAYS, HGRID_ERROR_NULL_ARGUMENT,
     HGRID_ERROR_OVERLAP, hgrid_status,
@@ -28,7 +28,7 @@ pub(crate) struct BatchArrays<R, T> {
     answer_stride: usize,
     pub(crate) count: usize,
     /// From the first byte to the last of the rays, and of the answers.
-    spans: [Span; 2],
+    addresses: [Addresses; 2],
 }
 
 impl<R, T> BatchArrays<R, T> {
@@ -49,13 +49,13 @@ impl<R, T> BatchArrays<R, T> {
             return Err(HGRID_ERROR_OVERLAP);
         }
         let (ray_stride, answer_stride) = (ray_elements.stride, answer_elements.stride);
-        let spans = [&ray_elements, &answer_elements].map(span);
-        Ok(Self { rays, ray_stride, answers, answer_stride, count, spans })
+        let addresses = [&ray_elements, &answer_elements].map(addresses);
+        Ok(Self { rays, ray_stride, answers, answer_stride, count, addresses })
     }
 
     /// Returns true if a region overlaps the bytes of the rays or of the answers.
-    pub(crate) fn overlaps(&self, other: Span) -> bool {
-        self.spans.iter().any(|span| span.overlaps(other))
+    pub(crate) fn overlaps(&self, other: Addresses) -> bool {
+        self.addresses.iter().any(|addresses| addresses.overlaps(other))
     }
 
     /// The address of a ray, of any alignment.
@@ -107,20 +107,20 @@ fn elements<T>(start: *const c_void, stride: usize, count: usize) -> Option<Elem
 }
 
 /// From the first element's first byte to the last element's last.
-fn span(elements: &Elements) -> Span {
-    Span::new(elements.start, elements.bytes)
+fn addresses(elements: &Elements) -> Addresses {
+    Addresses::new(elements.start, elements.bytes)
 }
 
 /// Returns true if a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
 /// same everywhere: the answer lies between two rays, or all of them are hit. With fewer than two elements the stride
-/// means nothing, and the spans decide.
+/// means nothing, and their addresses decide.
 fn overlap(
     (rays, ray_bytes): (&Elements, usize),
     (answers, answer_bytes): (&Elements, usize),
 ) -> bool {
-    if !span(rays).overlaps(span(answers)) {
+    if !addresses(rays).overlaps(addresses(answers)) {
         return false;
     }
     let distance = answers.start.addr().wrapping_sub(rays.start.addr()).cast_signed();

@@ -8,13 +8,13 @@ use hgrid_core::{
     ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
 };
 
-use super::batch_arrays::{BatchArrays, RunningBatch};
+use super::batch::{BatchArrays, RunningBatch};
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
+use crate::addresses::RawRegion;
 use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{
     hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
 };
-use crate::span::Region;
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
     HGRID_ERROR_STRUCT_SIZE, hgrid_status,
@@ -267,8 +267,8 @@ pub(crate) unsafe fn batch<T>(
         return Ok(());
     };
     let hgrid_query_options { scratch, scratch_bytes, .. } = asked.options;
-    let scratch = Region { start: scratch, bytes: scratch_bytes };
-    if batch.overlaps(scratch.span()) {
+    let scratch = RawRegion { start: scratch, bytes: scratch_bytes };
+    if batch.overlaps(scratch.addresses()) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: this function's contract, and no element of the batch lies there.

@@ -8,28 +8,28 @@ use core::ptr::null_mut;
 
 /// A region as the caller passes it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Region {
+pub(crate) struct RawRegion {
     pub(crate) start: *mut c_void,
     pub(crate) bytes: usize,
 }
 
-impl Region {
+impl RawRegion {
     /// No bytes.
     pub(crate) const NONE: Self = Self { start: null_mut(), bytes: 0 };
 
-    pub(crate) fn span(self) -> Span {
-        Span::new(self.start, self.bytes)
+    pub(crate) fn addresses(self) -> Addresses {
+        Addresses::new(self.start, self.bytes)
     }
 }
 
 /// The addresses `start..end`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
+pub(crate) struct Addresses {
     start: usize,
     end: usize,
 }
 
-impl Span {
+impl Addresses {
     pub(crate) fn new(start: *const c_void, bytes: usize) -> Self {
         let start = start.addr();
         Self { start, end: start.saturating_add(bytes) }
@@ -40,7 +40,7 @@ impl Span {
         self.start >= self.end
     }
 
-    /// Returns true if any byte lies in both; an empty span shares none.
+    /// Returns true if any byte lies in both; an empty range shares none.
     pub(crate) const fn overlaps(self, other: Self) -> bool {
         let start = if self.start > other.start { self.start } else { other.start };
         let end = if self.end < other.end { self.end } else { other.end };

@@ -14,7 +14,7 @@ use core::slice;
 use hgrid_core::{MeshPart, TriangleMesh};
 
 use super::{mesh, read, read_sized, shares, write};
-use crate::span::Span;
+use crate::addresses::Addresses;
 use crate::status::{
     HGRID_ERROR_INVALID_PARTS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
     HGRID_ERROR_STRUCT_SIZE, hgrid_status, status_of,
@@ -52,10 +52,10 @@ pub(crate) fn parts_of(mesh: &TriangleMesh<'_>) -> *const hgrid_part {
 }
 
 /// The bytes that the parts of a mesh take.
-pub(super) fn span_of(mesh: &TriangleMesh<'_>) -> Span {
+pub(super) fn addresses_of(mesh: &TriangleMesh<'_>) -> Addresses {
     let count = mesh.parts().len();
     let bytes = if count == 0 { 0 } else { size_of::<Head>() + size_of_val(mesh.parts()) };
-    Span::new(parts_of(mesh).cast(), bytes)
+    Addresses::new(parts_of(mesh).cast(), bytes)
 }
 
 /// The mesh that a description names by its parts.
@@ -125,9 +125,9 @@ impl Meshes {
         unsafe { mesh(&description) }
     }
 
-    fn span(&self) -> Option<Span> {
+    fn addresses(&self) -> Option<Addresses> {
         let elements = Elements::new(self.start.cast(), self.size, self.count, self.size)?;
-        Some(Span::new(elements.start, elements.bytes))
+        Some(Addresses::new(elements.start, elements.bytes))
     }
 }
 
@@ -148,8 +148,8 @@ pub(crate) unsafe fn join(
     let meshes = unsafe { Meshes::new(meshes, count) }?;
     let start: *const c_void = parts.cast_const().cast();
     let memory = Elements::new(start, 0, count, size_of::<hgrid_part>());
-    let memory = Span::new(start, memory.ok_or(HGRID_ERROR_INVALID_PARTS)?.bytes);
-    if meshes.span().ok_or(HGRID_ERROR_INVALID_PARTS)?.overlaps(memory) {
+    let memory = Addresses::new(start, memory.ok_or(HGRID_ERROR_INVALID_PARTS)?.bytes);
+    if meshes.addresses().ok_or(HGRID_ERROR_INVALID_PARTS)?.overlaps(memory) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // All of them are looked at before anything is written.
