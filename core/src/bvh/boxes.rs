@@ -8,8 +8,8 @@
 //! ```
 //!
 //! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
-//! origin of the first ray that is not done. A distance is `side * inverse - origin * inverse`; the second product is computed
-//! once a ray.
+//! origin of the first ray that is not done. A distance is `side * inverse - origin * inverse`; the second product is
+//! computed once a ray.
 //!
 //! ```text
 //! relative to the distance   near: node's origin 1, sum 1, growth 1, product 1, sum 1, inverse 1    6 u
@@ -18,7 +18,7 @@
 //! ```
 //!
 //! The factor for far sides is 1 + 16 u, and boxes grow by 8 u times the largest coordinate of an origin. Products stay
-//! finite, because scenes of 2^48 and more are not traced in groups.
+//! finite, because trees with an extent of 2^48 and more are not traced in groups.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};

@@ -221,15 +221,15 @@ fn build_in(
     // Cut bins into subtrees.
     watch.at(ROOTS)?;
     let (ids, nodes) = cut_index(&mut index, finite);
-    let scene = Lattice::pad(&bounds);
-    let work = BuildInputs { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
+    let bounds = Lattice::pad(&bounds);
+    let work = BuildInputs { mesh, least: least_node(&bounds), sizes, shift: KEY_BITS - bits };
     let roots = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
     let tree = work.top(entries, spare, nodes, &roots);
     let (node_count, levels) = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
-    finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
+    finish(mesh, Quality::Fast, bounds, index, finite, node_count, levels)
 }
 
 /// Finds the key of every triangle. Each task counts its triangles of each bin.
@@ -276,7 +276,7 @@ fn vertex_bounds(
 /// The inputs that the steps after binning share.
 struct BuildInputs<'w> {
     mesh: &'w TriangleMesh<'w>,
-    /// [`least_node`] of the scene.
+    /// [`least_node`] of the tree.
     least: f32,
     /// Entries of each bin.
     sizes: &'w [u32],

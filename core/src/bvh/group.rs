@@ -31,7 +31,7 @@ use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, Ray};
 use crate::simd::{HAS_PREFETCH, Kernel, SimdLevel, dispatch};
 
-/// Rays are scattered, and share little, if some origins lie farther apart than this part of the scene.
+/// Rays are scattered, and share little, if some origins lie farther apart than this part of the tree's extent.
 const SCATTERED: f32 = 1.0 / 4.0;
 /// The same for a tree that exceeds [`SHARED_CACHE`]: the nodes that rays share are a smaller part of all, so rays
 /// count as scattered sooner.
@@ -281,7 +281,7 @@ mod tests {
     fn scattered_rays_wait_for_memory_in_large_trees() {
         let nodes = vec![Node::EMPTY; SHARED_CACHE / size_of::<Node>() + 1];
         let few = CORE_CACHES / size_of::<Node>();
-        // The scene is 16 wide: its quarter is 4, its thirty-second part 0.5.
+        // The tree is 16 wide: its quarter is 4, its thirty-second part 0.5.
         for (count, apart, waits) in [
             (few, 8.0, false),
             (few + 1, 8.0, true),

@@ -60,7 +60,7 @@ pub(super) fn move_nodes(nodes: &mut [Node], from: Range<u32>, to: u32) {
 pub(super) fn finish(
     mesh: &TriangleMesh<'_>,
     quality: Quality,
-    scene: Aabb,
+    bounds: Aabb,
     index: Option<&mut [u8]>,
     finite: u32,
     node_count: u32,
@@ -75,7 +75,7 @@ pub(super) fn finish(
             padding.fill(0);
         }
     }
-    let lattice = Lattice::new(scene, [1; 3]);
+    let lattice = Lattice::new(bounds, [1; 3]);
     let mut header = Header::new(Parameters::Bvh { quality }, mesh, &lattice);
     header.skipped_count = mesh.triangle_count() - finite;
     header.reference_count = finite;

@@ -11,7 +11,7 @@
 //!
 //! Distances are squared and in f32. A bound must never drop a triangle that the test in f64 would report:
 //!
-//! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the scene is one to
+//! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the tree is one to
 //!   two away. No square overflows, and what underflows in one is below [`TINY`].
 //! - **Boxes.** A side relative to the point has two roundings. Where the node lies within 2^9 steps of the
 //!   point, they are below 2^-13 steps, which the margin of quantised boxes absorbs
@@ -50,7 +50,7 @@ const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
 pub(crate) struct ClosestSearch<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
-    /// The box of the scene.
+    /// The box of the tree.
     pub(crate) bounds: &'r Aabb,
     pub(crate) point: [f32; 3],
     /// Triangles that are farther do not matter.
@@ -74,7 +74,7 @@ impl Point {
     #[inline(always)]
     fn new(point: [f32; 3], bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        // Find the distance to the farthest side of the scene, and its largest coordinate.
+        // Find the distance to the farthest side of the tree, and its largest coordinate.
         let (mut farthest, mut largest) = (0.0, 0.0);
         for axis in 0..3 {
             // Quarters do not overflow.

@@ -168,7 +168,7 @@ impl Node {
     }
 
     /// Writes the boxes of the children that exist; `bounds` holds them all, and `least` is
-    /// [`least_node`] of the scene.
+    /// [`least_node`] of the tree.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
         self.frame(bounds, least);
         for (slot, child) in boxes.iter().enumerate() {
@@ -296,14 +296,14 @@ const MARGIN: f32 = 1.0 / 64.0;
 /// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than their rounding.
 const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
 
-/// The least extent of a node in parts of the scene's: 254 steps of 2^-60.
+/// The least extent of a node in parts of the tree's: 254 steps of 2^-60.
 const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
 
 /// The least extent that a node is quantised for, where it is called `least`: smaller boxes count as this large. So no
-/// step is below 2^-60 of the scene's extent, and a finite number can stand for the inverse of a zero direction
+/// step is below 2^-60 of the tree's extent, and a finite number can stand for the inverse of a zero direction
 /// ([`slab`](super::slab)).
-pub(crate) fn least_node(scene: &Aabb) -> f32 {
-    scene.size().max_element() * LEAST_NODE
+pub(crate) fn least_node(bounds: &Aabb) -> f32 {
+    bounds.size().max_element() * LEAST_NODE
 }
 
 /// Two rows of eight sides as floats.

@@ -42,7 +42,7 @@ pub(crate) struct Rays {
     choice: Choice,
     /// Raises `t_min` to 0. For rays that were moved to the box of the tree, so that nothing lies behind their origins.
     pub(crate) starts_at_box: bool,
-    /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
+    /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
@@ -78,7 +78,7 @@ pub(crate) struct Rays {
 /// Eight roundings of a number, in parts of it.
 const ROUNDINGS: f32 = 8.0 * UNIT;
 
-/// In larger scenes, products with [`STEEP`] may overflow.
+/// In trees of larger extent, products with [`STEEP`] may overflow.
 const MOST_EXTENT: f32 = 16_777_216.0 * 16_777_216.0; // 2^48
 
 /// Pairs that are decided at once.
@@ -134,7 +134,7 @@ impl Rays {
         let half = (size * 0.5).to_array();
         let extent = size.max_element();
         self.extent = extent;
-        // In a huge scene no ray counts as near: all are traced alone.
+        // In a tree of huge extent no ray counts as near: all are traced alone.
         let near = if extent < MOST_EXTENT { FAR_EXTENTS * extent } else { -1.0 };
         let near = f32x8::splat(simd, near);
         let zero = f32x8::splat(simd, 0.0);

@@ -4,7 +4,7 @@
 //! check   the mesh has the triangles of the tree; walking down from the root meets each node once
 //! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; unite those of
 //!         each leaf, the last of them repeated up to eight; quantise, hand the union of all to the parent
-//! again   if unused vertices widened the box of the scene so far that a node was too thin for it
+//! again   if unused vertices widened the box of the tree so far that a node was too thin for it
 //! ```
 //!
 //! The check finds all errors, so nothing is written before an error. The boxes are those of a build with
@@ -41,24 +41,24 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     let level = SimdLevel::detect();
     let bvh = Bvh::open(&header, blob)?;
     bvh.check_ids(&header, mesh)?;
-    let (levels, before) = dispatch(level, Check(&bvh))?;
-    let scene = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
+    let (levels, before) = dispatch(level, CheckNodes(&bvh))?;
+    let bounds = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
     let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
         let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
         Some((&*ids, split_mut::<Node>(behind, header.node_count.into())?.0))
     });
     let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-    let mut tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
+    let mut tree = Tree { mesh, ids, nodes, least: least_node(&bounds) };
     let mut refitted = tree.refit(level, levels);
-    let scene = Lattice::pad(&refitted.bounds);
+    let bounds = Lattice::pad(&refitted.bounds);
     // Vertices that no triangle uses count for nothing in a build. If they made a step larger, start anew.
-    let least = least_node(&scene);
+    let least = least_node(&bounds);
     if least < tree.least && refitted.thinnest < tree.least {
         tree.least = least;
         refitted = tree.refit(level, levels);
     }
-    debug_assert!(Lattice::pad(&refitted.bounds) == scene, "the box of all triangles changed");
-    (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
+    debug_assert!(Lattice::pad(&refitted.bounds) == bounds, "the box of all triangles changed");
+    (header.bounds_min, header.bounds_max) = (bounds.min.to_array(), bounds.max.to_array());
     if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
@@ -89,9 +89,9 @@ impl Bvh<'_> {
 }
 
 /// Finds all that could be wrong with nodes; returns the levels of nodes and the SAH cost.
-struct Check<'b>(&'b Bvh<'b>);
+struct CheckNodes<'b>(&'b Bvh<'b>);
 
-impl Kernel for Check<'_> {
+impl Kernel for CheckNodes<'_> {
     type Output = Result<(u32, f64), Error>;
 
     #[inline(always)]
@@ -158,15 +158,15 @@ impl Tree<'_> {
     /// Writes the boxes of all nodes, of which there are so many levels.
     fn refit(&mut self, level: SimdLevel, levels: u32) -> Refitted {
         if levels <= FEW_LEVELS {
-            dispatch(level, Refit::<{ FEW_LEVELS as usize }>(self))
+            dispatch(level, RefitNodes::<{ FEW_LEVELS as usize }>(self))
         } else {
-            dispatch(level, Refit::<{ LEVELS as usize }>(self))
+            dispatch(level, RefitNodes::<{ LEVELS as usize }>(self))
         }
     }
 }
 
 /// A tree of at most `N` levels that gets new boxes.
-struct Refit<'t, 'b, const N: usize>(&'t mut Tree<'b>);
+struct RefitNodes<'t, 'b, const N: usize>(&'t mut Tree<'b>);
 
 /// A node on the way down. Small numbers, as the stack holds one for each level.
 #[derive(Clone, Copy)]
@@ -180,7 +180,7 @@ struct RefitNode {
     boxes: [[f32; 6]; WIDTH],
 }
 
-impl<const N: usize> Kernel for Refit<'_, '_, N> {
+impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
     type Output = Refitted;
 
     #[inline(always)]

@@ -78,7 +78,7 @@ fn copy_what_fits<T: Copy>(from: &[T], to: Option<&mut [T]>) {
 /// The roots of a range of units.
 pub(crate) struct Roots<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
-    /// [`least_node`](super::node::least_node) of the scene.
+    /// [`least_node`](super::node::least_node) of the tree.
     pub(crate) least: f32,
     /// The entries, over which the records are written.
     pub(crate) entries: &'w mut [Entry],

@@ -1,8 +1,8 @@
 //! Starts the traversals of a tree: a ray against triangles, a ray with an f64 origin against boxes, a point.
 //!
 //! ```text
-//! ray     near the scene      traverse at once
-//!         farther away        move the origin to the scene first (approach.rs), then traverse
+//! ray     near the tree       traverse at once
+//!         farther away        move the origin to the tree first (approach.rs), then traverse
 //!         remote              test all triangles: distances in f32 would say nothing
 //! point   traverse, nearest boxes first (nearest.rs)
 //! ```

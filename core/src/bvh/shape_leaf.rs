@@ -4,7 +4,7 @@
 //! A box is six numbers in the caller's memory, not quantised, so it has no margin of its own. Each side is
 //! subtracted and multiplied with two roundings, which the wider inverse of far sides absorbs
 //! ([`slab`](super::slab)). The inverse of a zero direction is finite, so a ray along a side would cross it at
-//! distance 0: [`pad_of`] moves the crossing behind the scene.
+//! distance 0: [`pad_of`] moves the crossing behind the tree.
 
 use fearless_simd::{Simd, f32x4, f32x8};
 
@@ -63,8 +63,8 @@ fn box_rows(sides: &[u8; BOX_BYTES]) -> [RowBytes; 2] {
 /// 2^-40.
 const PAD: f32 = 1.0 / (1_048_576.0 * 1_048_576.0);
 
-/// Returns the distance by which the sides of boxes are moved outwards: 2^-40 of the scene's extent. Times the steepest
-/// inverse, it is a distance far behind the scene.
+/// Returns the distance by which the sides of boxes are moved outwards: 2^-40 of the tree's extent. Times the steepest
+/// inverse, it is a distance far behind the tree.
 #[inline(always)]
 pub(super) fn pad_of(bounds: &Aabb) -> f32 {
     (bounds.size().max_element() * PAD).max(f32::MIN_POSITIVE)

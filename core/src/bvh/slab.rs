@@ -11,17 +11,17 @@
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
 //! - **Absolute errors.** The margin of quantised boxes absorbs those where terms cancel ([`node`](super::node)).
 //! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by
-//!   2^-38 of the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The
+//!   2^-38 of the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the tree's extent. The
 //!   relative margin covers the first; [`growth_of_range`] adds twice the second.
-//! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
-//!   2^-6 of a step, so a ray inside one leaves it behind the end of the scene, and one outside never
-//!   enters. Products stay finite as long as the scene is smaller than 2^50; beyond, a NaN counts as a
+//! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the tree and its margin is
+//!   2^-6 of a step, so a ray inside one leaves it behind the end of the tree, and one outside never
+//!   enters. Products stay finite as long as the tree's extent is below 2^50; beyond, a NaN counts as a
 //!   box that is met.
-//! - **Far origins.** The ray starts at a point near the scene ([`Approach`]), which may be off the ray by
+//! - **Far origins.** The ray starts at a point near the tree ([`Approach`]), which may be off the ray by
 //!   `slack`; near sides are that much nearer, far sides farther.
 //!
 //! The direction is scaled by a power of two so that its largest component lies between 1 and 2, and the
-//! range of the ray with it: distances are about those of the scene, whatever the direction's length.
+//! range of the ray with it: distances are about those in the tree, whatever the direction's length.
 
 use glam::Vec3A;
 
@@ -42,7 +42,7 @@ pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
 
 /// Returns the amount by which near sides are moved back where sides may lie behind the start: [`WIDER`] moves a far
-/// side with a negative distance nearer, not farther. `distance` is that of the scene's farthest corner.
+/// side with a negative distance nearer, not farther. `distance` is that of the farthest corner of the tree's box.
 #[inline(always)]
 fn behind(distance: f32) -> f32 {
     2.0 * (WIDER - 1.0) * distance
@@ -211,7 +211,9 @@ fn moved_back(point: Vec3A, by: f32, inverse: Vec3A) -> Vec3A {
 
 /// The near side on each axis: 0 for the low side, [`FLIP`] for the high side.
 pub(super) type NearSides = [usize; 3];
-/// The distance in rows of [`Node::bounds`](super::node::Node) from the low side of an axis to its high side. XOR with it swaps the sides.
+
+/// The distance in rows of a [`Node`](super::node::Node)'s bounds from the low side of an axis to its high side. XOR
+/// with it swaps the sides.
 pub(super) const FLIP: usize = 3;
 
 /// Finds the near side on each axis.

@@ -87,7 +87,7 @@ impl EntryRange {
 }
 
 /// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids lie in the index from `first` on, the nodes
-/// below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the scene. Where cuts by keys
+/// below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the tree. Where cuts by keys
 /// make more nodes than the layout has room for, ranges are halved.
 pub(crate) struct Build<'w> {
     pub(crate) subtree: &'w mut Subtree,

@@ -106,7 +106,7 @@ pub(crate) struct Top {
 /// Makes the nodes over some items and writes all but the topmost to `nodes`. `record` returns the node of a subtree,
 /// which becomes a child, and its levels. Returns `None` if `nodes` is too short.
 ///
-/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::node::least_node) of the scene.
+/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::node::least_node) of the tree.
 pub(crate) fn build(
     items: &mut [RootItem],
     record: impl Fn(u32) -> (Node, u32),
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_without_a_surface_are_cut_in_halves() {
+    fn roots_without_a_surface_are_cut_in_halves() {
         for scale in [1e-38_f32, 1e-20, 1e20, 1e36] {
             let line: Vec<_> =
                 (0_u8..100).map(|i| cube(f32::from(i) / 100.0 * scale, 0.0)).collect();

@@ -142,7 +142,7 @@ impl Bvh<'_> {
     }
 }
 
-/// No step is smaller than this part of the scene: half of a build's.
+/// No step is smaller than this part of the tree's extent: half of a build's.
 const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-61
 
 impl Node {

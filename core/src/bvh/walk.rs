@@ -47,7 +47,7 @@ pub(crate) struct OneRay<'r, F, T> {
     /// the closest hit in another instance.
     pub(crate) part: [f32; 2],
     pub(crate) cull: Cull,
-    /// The box of the scene.
+    /// The box of the tree.
     pub(crate) bounds: &'r Aabb,
     /// The slab and the filter of a ray from far away, which [`Slab::nearby`] cannot compute.
     pub(crate) afar: Option<&'r (Slab, RayFilter)>,

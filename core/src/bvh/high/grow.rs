@@ -49,7 +49,7 @@ pub(super) struct Grow<'w> {
     pub(super) first: u32,
     /// The factor that scales lengths before areas are computed from them.
     pub(super) unit: f32,
-    /// [`least_node`](crate::bvh::node::least_node) of the scene.
+    /// [`least_node`](crate::bvh::node::least_node) of the tree.
     pub(super) least: f32,
 }
 

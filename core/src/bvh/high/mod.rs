@@ -109,14 +109,14 @@ pub(super) fn build_in(
 
     // Make the nodes.
     watch.at(TOP)?;
-    let scene = Lattice::pad(&bounds);
-    let unit = inverse_power(scene.size().max_element());
-    let work = HighInputs { least: least_node(&scene), unit, tasks };
+    let bounds = Lattice::pad(&bounds);
+    let unit = inverse_power(bounds.size().max_element());
+    let work = HighInputs { least: least_node(&bounds), unit, tasks };
     let (ids, nodes) = cut_index(&mut index, finite as u32);
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
-    finish(mesh, Quality::High, scene, index, finite as u32, node_count, levels)
+    finish(mesh, Quality::High, bounds, index, finite as u32, node_count, levels)
 }
 
 /// A power of two near the inverse of a length.
