@@ -17,16 +17,18 @@ fn agrees(mesh: &Mesh, tests: u64) {
         prove(&grid).unwrap();
         let bytes = owned.bytes().len();
         assert!(bytes <= 16 * mesh.indices.len() + 640, "{bytes} bytes");
+        let mut hits = 0;
         let longest = rays(mesh, &grid, 150)
             .into_iter()
             .map(|ray| {
-                oracle::check(&grid, &ray);
+                hits += usize::from(oracle::check(&grid, &ray));
                 let mut counters = Counters::default();
                 let _ = grid.intersect_with(&ray, &mut QueryOptions::counting(&mut counters));
                 counters.primitive_tests
             })
             .max();
         assert!(longest <= Some(tests), "{longest:?} tests, {tests} expected");
+        assert!(hits > 20, "{hits}");
     }
 }
 
@@ -82,11 +84,14 @@ fn crowds_in_crowds() {
     let grid = owned.open(&view).unwrap();
     let mut random = Random(83);
     for size in [0.02, 1e-3] {
+        let mut hits = 0;
         for _ in 0..300 {
             let mut point = || random.point().map(|c| 0.3 + size * c);
             let (origin, target) = (point(), point());
-            oracle::check(&grid, &Ray::new(origin, std::array::from_fn(|k| target[k] - origin[k])));
+            let ray = Ray::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
+            hits += usize::from(oracle::check(&grid, &ray));
         }
+        assert!(hits > 100, "{hits}");
     }
 }
 
