@@ -68,9 +68,8 @@ fn answers_the_same(joined: &Grid<'_>, one: &Grid<'_>) {
             assert_eq!(closest(joined), closest(one), "{point:?}");
         }
     }
-    for ray in &all[..60] {
-        oracle::check(joined, ray);
-    }
+    let hits = all[..60].iter().filter(|ray| oracle::check(joined, ray)).count();
+    assert!(hits > 20 || joined.mesh().triangle_count() == 0, "{hits}");
     let skip =
         all.iter().find_map(|ray| one.intersect(ray)).map_or(INVALID_ID, |hit| hit.primitive);
     for (mask, cull, skip) in
@@ -198,7 +197,8 @@ fn a_refit_moves_the_vertices_of_all_parts() {
         assert!(joined.bytes() == one.bytes());
         let grid = Grid::open(joined.bytes(), after).unwrap();
         prove(&grid).unwrap();
-        rays(40).iter().for_each(|ray| oracle::check(&grid, ray));
+        let hits = rays(40).iter().filter(|ray| oracle::check(&grid, ray)).count();
+        assert!(hits > 12 && hits < 40, "{hits}");
     }
 }
 

@@ -74,9 +74,8 @@ fn interleaved_rays_agree_with_each_alone() {
     let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
     let grid = owned.open(&view).unwrap();
     let rays = rays();
-    for ray in rays.iter().step_by(600) {
-        oracle::check(&grid, ray);
-    }
+    let hits = rays.iter().step_by(600).filter(|ray| oracle::check(&grid, ray)).count();
+    assert!(hits > 1 && hits < 7, "{hits}");
     let alone = |options: &mut QueryOptions<'_>| -> Vec<Hit> {
         rays.iter().map(|ray| grid.intersect_with(ray, options).unwrap_or(Hit::MISS)).collect()
     };

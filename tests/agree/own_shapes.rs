@@ -68,16 +68,16 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
             let built = Built::shapes(boxes, &config).unwrap();
             let shapes = Shapes::open(built.bytes(), boxes).unwrap();
             assert_eq!(shapes.count() as usize, count);
-            let mut random = Random(5);
+            let (mut random, mut hits) = (Random(5), 0);
             for round in 0..400 {
                 let ray = ray(&mut random, round);
                 let mask = [u32::MAX, 1, 6][round % 3];
                 let seen = |id: usize| mask == u32::MAX || masks[id] & mask != 0;
-                let hits =
+                let met =
                     all.iter().enumerate().filter(|(id, _)| seen(*id)).filter_map(
                         |(id, sphere)| meet(*sphere, &ray).map(|hit| (hit.t, id as u32)),
                     );
-                let expected = hits.reduce(|a, b| if b < a { b } else { a });
+                let expected = met.reduce(|a, b| if b < a { b } else { a });
 
                 let mut asked = HashSet::new();
                 let mut test = |id: u32, part: &Ray| {
@@ -101,7 +101,9 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
                 let mut test = |id: u32, part: &Ray| meet(all[id as usize], part);
                 let is_hit = shapes.occluded_with(&ray, &mut options, &mut test);
                 assert_eq!(is_hit, expected.is_some(), "{ray:?}");
+                hits += usize::from(is_hit);
             }
+            assert!(hits < 300 && (hits > 2 || count == 0), "{count}: {hits}");
         }
     }
 }
@@ -321,6 +323,7 @@ fn shapes_whose_boxes_a_ray_touches_are_offered() {
     let view = Boxes::new(&boxes).unwrap();
     let built = Built::shapes(view, &Config::default()).unwrap();
     let shapes = Shapes::open(built.bytes(), view).unwrap();
+    let mut touched = 0;
     for round in 0..2000 {
         let mut from = [quarter(), quarter(), quarter()];
         let mut direction = [quarter(), quarter(), quarter()];
@@ -358,8 +361,10 @@ fn shapes_whose_boxes_a_ray_touches_are_offered() {
                 }
             }
             assert!(near > far || offered[id], "shape {id} {sides:?} {ray:?}");
+            touched += usize::from(near <= far);
         }
     }
+    assert!(touched > 5000, "{touched}");
 }
 
 #[test]
@@ -391,12 +396,14 @@ fn moved_shapes_are_found_after_a_refit() {
     Shapes::refit(built.bytes_mut(), &view).unwrap();
     let shapes = Shapes::open(built.bytes(), view).unwrap();
     shapes.validate(&mut vec![0; shapes.validate_bytes()]).unwrap();
-    let mut random = Random(2);
+    let (mut random, mut hits) = (Random(2), 0);
     for round in 0..200 {
         let ray = ray(&mut random, round);
-        let hits = moved.iter().filter_map(|sphere| meet(*sphere, &ray).map(|hit| hit.t));
-        let expected = hits.reduce(f32::min);
+        let met = moved.iter().filter_map(|sphere| meet(*sphere, &ray).map(|hit| hit.t));
+        let expected = met.reduce(f32::min);
         let mut test = |id: u32, part: &Ray| meet(moved[id as usize], part);
         assert_eq!(shapes.intersect(&ray, &mut test).map(|hit| hit.t), expected);
+        hits += usize::from(expected.is_some());
     }
+    assert!(hits > 10 && hits < 150, "{hits}");
 }
