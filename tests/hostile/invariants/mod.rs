@@ -13,9 +13,10 @@ mod variable;
 
 use std::ops::Range;
 
-use hgrid_core::{Error, Grid};
+use hgrid_core::{Error, Grid, Ray};
 use hgrid_tests::copy::Copy;
-use hgrid_tests::hostile::{Seed, ends, fixed_rays};
+use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays};
+use hgrid_tests::meshes::Mesh;
 use hgrid_tests::owned::prove;
 
 /// A row of a table: a name of the damage, the offsets where the error may point, and the change.
@@ -43,4 +44,18 @@ fn refused(seed: &Seed, cases: &[Case<'_>]) {
             if usize::try_from(offset).is_ok_and(|offset| at.contains(&offset)));
         assert!(is_there, "{method:?}: {what}: {result:?}, expected at {at:?}");
     }
+}
+
+/// Sends fixed rays, and one to the middle of every seventh triangle of the mesh; most of the latter must hit.
+fn answers_right(grid: &Grid<'_>, mesh: &Mesh) {
+    agrees(grid, &fixed_rays(grid.bounds(), 60));
+    let start = [3.0, -1.5, 2.0];
+    let towards = |triangle: &[u32; 3]| {
+        let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let middle = |k: usize| corners.iter().map(|corner| corner[k] / 3.0).sum::<f32>();
+        Ray::new(start, std::array::from_fn(|k| middle(k) - start[k]))
+    };
+    let rays: Vec<_> = mesh.indices.iter().step_by(7).map(towards).collect();
+    let hits = agrees(grid, &rays);
+    assert!(2 * hits > rays.len(), "{hits} of {}", rays.len());
 }

@@ -142,11 +142,12 @@ fn in_order(grid: &Grid<'_>, ray: &Ray) {
     assert!(shown.iter().all(is_seen), "{shown:?} {ray:?}");
 }
 
-/// Queries a valid grid: every answer must be that of brute force, bit for bit, at every SIMD level.
+/// Queries a valid grid: every answer must be that of brute force, bit for bit, at every SIMD level. Returns the
+/// number of rays that hit.
 ///
 /// # Panics
 /// If an answer differs.
-pub fn agrees(grid: &Grid<'_>, rays: &[Ray]) {
+pub fn agrees(grid: &Grid<'_>, rays: &[Ray]) -> usize {
     let expected: Vec<Hit> =
         rays.iter().map(|ray| oracle::brute_force(grid, ray).unwrap_or(Hit::MISS)).collect();
     for ray in rays.iter().take(ASKED_ALL) {
@@ -170,6 +171,7 @@ pub fn agrees(grid: &Grid<'_>, rays: &[Ray]) {
     }
     ends(grid, rays);
     packs(grid, rays);
+    expected.iter().filter(|hit| **hit != Hit::MISS).count()
 }
 
 /// Packs a valid grid with its mesh: the packed blob must open and give the same answers.
