@@ -34,7 +34,7 @@ fn accepted_mutants_answer_right() {
     let mut random = Random(setting("HGRID_SEED", 1));
     let seeds: Vec<&Seed> = seeds().filter(|seed| seed.blob.len() < 20_000).collect();
     let mut accepted = [0_u64; Method::ALL.len()];
-    let mut opened = 0;
+    let (mut opened, mut hits) = ([0; Method::ALL.len()], 0);
     for round in 0..count {
         let which = random.below(seeds.len());
         let seed = seeds[which];
@@ -48,22 +48,26 @@ fn accepted_mutants_answer_right() {
             continue;
         }
         let Ok(grid) = Grid::open(copy.bytes(), seed.mesh.view()) else { continue };
-        opened += 1;
+        let method = Method::ALL.iter().position(|&method| method == grid.method()).unwrap();
+        opened[method] += 1;
         if prove(&grid).is_err() {
             continue;
         }
         // Shown if the test fails.
         println!("round {round}: {:?} with {} triangles", grid.method(), seed.mesh.indices.len());
-        agrees(&grid, &fixed_rays(grid.bounds(), 10));
+        hits += agrees(&grid, &fixed_rays(grid.bounds(), 10));
         // If only the header differs, a build may make the same blob.
         let is_other = copy.bytes()[CHECKSUM + 4..] != seed.blob[CHECKSUM + 4..];
-        let method = Method::ALL.iter().position(|&method| method == grid.method()).unwrap();
         accepted[method] += u64::from(is_other);
     }
-    println!("{count} mutants, {opened} opened; accepted with other bytes behind the header:");
-    for (method, count) in Method::ALL.iter().zip(accepted) {
-        println!("{method:?}: {count}");
+    println!(
+        "{count} mutants, {hits} hits; opened, and accepted with other bytes behind the header:"
+    );
+    for (method, counts) in Method::ALL.iter().zip(opened.iter().zip(accepted)) {
+        println!("{method:?}: {counts:?}");
     }
-    assert!(opened > count / 2, "{opened} of {count} opened");
+    assert!(opened.iter().sum::<u64>() > count / 2, "{opened:?} of {count} opened");
+    assert!(opened.iter().all(|&opened| opened > count / 40), "{opened:?} of {count} opened");
     assert!(accepted.iter().sum::<u64>() > count / 1000, "{accepted:?}");
+    assert!(hits as u64 > count / 200, "{hits}");
 }

@@ -2,4 +2,6 @@
 
 use hgrid_tests::hostile::build_mesh;
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| build_mesh(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    build_mesh(data);
+});

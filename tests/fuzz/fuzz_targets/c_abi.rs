@@ -2,4 +2,6 @@
 
 use hgrid_tests::hostile::c_abi;
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| c_abi(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    c_abi(data);
+});

@@ -19,13 +19,13 @@ use crate::owned::prove;
 /// The largest index or scratch that is built; larger ones are only sized.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Runs the target; see the head of this file.
-pub fn run(data: &[u8]) {
+/// Runs the target; see the head of this file. Returns true if a grid was queried.
+pub fn run(data: &[u8]) -> bool {
     let mut u = Unstructured::new(data);
-    let _ = describe_and_build(&mut u);
+    describe_and_build(&mut u).unwrap_or(false)
 }
 
-fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
+fn describe_and_build(u: &mut Unstructured<'_>) -> Result<bool> {
     let config = config(u)?;
     let (tasks, run) = (u32::arbitrary(u)? % 8, Loop::arbitrary(u)?);
     let shape = Shape::new(u)?;
@@ -34,12 +34,10 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
         let numbers =
             <[usize; 4]>::arbitrary(u)?.map(|n| if n.leading_zeros() < 4 { n } else { n % 64 });
         let [stride, vertices, index_stride, triangles] = numbers;
-        if let Ok(view) = shape.strided([stride, vertices], [index_stride, triangles]) {
-            build(u, view, &config, tasks, run);
-        }
-        return Ok(());
+        let view = shape.strided([stride, vertices], [index_stride, triangles]);
+        return Ok(view.is_ok_and(|view| build(u, view, &config, tasks, run)));
     }
-    build(u, shape.view(), &config, tasks, run);
+    let is_built = build(u, shape.view(), &config, tasks, run);
     // This comes last, so that bytes kept before it was added keep their meaning.
     if rarely(u, 3)? {
         let cuts = <[u8; 6]>::arbitrary(u)?;
@@ -48,15 +46,22 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
         let mesh = TriangleMesh::join(&mut parts).expect("sound meshes");
         build(u, mesh, &config, tasks, run);
     }
-    Ok(())
+    Ok(is_built)
 }
 
-fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, tasks: u32, run: Loop) {
+/// Builds a grid in several ways and queries it; returns false if none is built.
+fn build(
+    u: &mut Unstructured<'_>,
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    tasks: u32,
+    run: Loop,
+) -> bool {
     let serial = |count: u32, task: &(dyn Fn(u32) + Sync)| (0..count).for_each(task);
     let honest = Control { tasks, run: &serial, progress: None };
     let caller = run.for_core();
     let odd = Control { tasks, run: &caller, progress: None };
-    let Some((exact, mut scratch)) = sized(mesh, config, &honest) else { return };
+    let Some((exact, mut scratch)) = sized(mesh, config, &honest) else { return false };
 
     // A loop that does not do its work is found out, or was not needed.
     if !run.is_right() {
@@ -117,6 +122,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     let mut rays = rays::fixed_rays(grid.bounds(), 6);
     rays.extend(rays::chosen(u, &grid).unwrap_or_default());
     agrees(&grid, &rays);
+    true
 }
 
 /// Returns the sizes of a build and its scratch; `None` if the build fails, or takes more memory than is built with.

@@ -18,16 +18,16 @@ use super::shape::{self, Shape};
 /// The largest index or scratch that is built.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Runs the target; see the head of this file.
-pub fn run(data: &[u8]) {
+/// Runs the target; see the head of this file. Returns true if the last grid of the calls was queried.
+pub fn run(data: &[u8]) -> bool {
     let mut u = Unstructured::new(data);
-    let Ok(shape) = Shape::new(&mut u) else { return };
+    let Ok(shape) = Shape::new(&mut u) else { return false };
     let mut caller =
         Caller { shape: &shape, grid: hgrid_grid::NONE, opened: None, memory: Vec::new() };
     let _ = caller.calls(&mut u);
     // This comes last, so that bytes kept before it was added keep their meaning.
     let _ = caller.join(&mut u);
-    caller.settle();
+    caller.settle()
 }
 
 /// A view that no call has written.

@@ -287,9 +287,9 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// Checks the last grid of the program.
-    pub(super) fn settle(&self) {
-        let Some(grid) = self.core() else { return };
+    /// Checks the last grid of the program; returns true if there is one.
+    pub(super) fn settle(&self) -> bool {
+        let Some(grid) = self.core() else { return false };
         let rays = rays::fixed_rays(grid.bounds(), 4);
         if self.opened.as_ref().is_some_and(|opened| opened.is_right) {
             prove(&grid).expect("what was built is valid");
@@ -297,6 +297,7 @@ impl Caller<'_> {
         } else {
             ends(&grid, &rays);
         }
+        true
     }
 }
 

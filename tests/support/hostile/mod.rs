@@ -38,8 +38,8 @@ pub use validate::run as validate;
 pub struct Target {
     /// The name of the target and of its folders.
     pub name: &'static str,
-    /// The function.
-    pub run: fn(&[u8]),
+    /// The function, which returns true if the bytes lead to a grid that was queried.
+    pub run: fn(&[u8]) -> bool,
 }
 
 /// All targets.
