@@ -315,6 +315,8 @@ fn what_is_named_blocks_the_ray() {
             ..choices(INVALID_ID)[0]
         }) {
             let hits = truth.culling(asked.cull);
+            let blocked = hits.iter().filter(|hits| !hits.is_empty()).count();
+            assert!(blocked > 400 && blocked < rays.len() - 400, "{blocked} of {}", rays.len());
             for (ray, hits) in rays.iter().zip(&hits) {
                 let named = grid.occluder(ray, &mut asked.options()).unwrap_or(INVALID_ID);
                 check_occluder(&grid, hits, asked, named, "alone");

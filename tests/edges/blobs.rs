@@ -25,10 +25,13 @@ fn a_copy_is_the_same_grid() {
     let (grid, moved) = (owned.open(&view).unwrap(), open(&copy, &mesh).unwrap());
     prove(&moved).unwrap();
     assert_eq!(moved.resolution(), grid.resolution());
+    let mut hits = 0;
     for _ in 0..500 {
         let ray = Ray::new(random.point(), random.point());
         assert_eq!(moved.intersect(&ray), grid.intersect(&ray));
+        hits += usize::from(grid.occluded(&ray));
     }
+    assert!(hits > 50, "{hits}");
 }
 
 #[test]
@@ -93,7 +96,7 @@ fn many_damaged_bytes_are_harmless() {
 fn damaged_bytes(config: &Config) {
     let mesh = soup(200, 0.1, 53);
     let owned = Owned::build(&mesh.view(), config).unwrap();
-    let mut random = Random(59);
+    let (mut random, mut opened) = (Random(59), 0);
     for _ in 0..3000 {
         let mut copy = Copy::of(owned.bytes());
         for _ in 0..=random.below(20) {
@@ -106,8 +109,10 @@ fn damaged_bytes(config: &Config) {
         if let Ok(grid) = open(&copy, &mesh) {
             query(&grid);
             let _ = prove(&grid);
+            opened += 1;
         }
     }
+    assert!(opened > 800 && opened < 3000, "{opened}");
 }
 
 #[test]

@@ -124,7 +124,7 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
     let (rays, bytes) = (rays(), Block::bytes(&file));
     let heads = heads(bytes);
     let mut random = Random(setting("HGRID_SEED", 1));
-    let (mut opened, mut accepted) = (0, 0);
+    let (mut opened, mut accepted, mut hits) = (0, 0, 0);
     for round in 0..mutants() {
         let mut copy = Copy::of(bytes);
         for _ in 0..=round % 3 {
@@ -164,12 +164,13 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
             for hit in rays.iter().filter_map(|ray| mutant.intersect(ray)) {
                 let Some(Object::Grid(grid)) = mutant.object_of(&hit) else { panic!("a grid") };
                 assert!(hit.primitive < grid.mesh().triangle_count(), "round {round}");
+                hits += 1;
             }
         });
     }
     assert!(
-        opened > mutants() / 10 && accepted > mutants() / 1000,
-        "{opened} opened, {accepted} accepted"
+        opened > mutants() / 10 && accepted > mutants() / 1000 && hits > accepted,
+        "{opened} opened, {accepted} accepted, {hits} hits"
     );
 }
 
