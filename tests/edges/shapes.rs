@@ -100,7 +100,7 @@ fn flat_scenes_at(heights: &[f32]) {
                 p[axis] = height;
                 p
             });
-            // So far away, vertices lie on a lattice of few points.
+            // At -1e10 the box is far wider than the mesh, so that few rays meet it.
             agrees(&flat, if height.abs() < 1e10 { 2 } else { 0 });
         }
         let line = soup(300, 0.1, 3).map(|p| {
@@ -124,7 +124,7 @@ fn tiny_and_huge_scenes() {
 
 #[test]
 fn scenes_far_from_the_origin() {
-    // At the last place only the ball is wider than the distance from one coordinate to the next.
+    // At the last place the soup shrinks to a point and the ball to a line.
     for (shift, least) in [(1e2, [3, 6]), (1e4, [2, 6]), (1e6, [3, 6]), (1e10, [0, 1])] {
         agrees(&soup(300, 0.1, 3).map(|p| p.map(|c| c + shift)), least[0]);
         agrees(&ball(6, 1.0).map(|[x, y, z]| [x + shift, y, z - shift]), least[1]);
