@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use hgrid_program_tests::symbols::{extract_ours, symbols, symbols_of_ours};
 use hgrid_tests::artefact::{Flavour, compiler, root, run, static_library};
-use hgrid_tests::symbols::{extract_ours, symbols, symbols_of_ours};
 use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 

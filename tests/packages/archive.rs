@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use hgrid_program_tests::symbols::symbols;
 use hgrid_tests::artefact::{bare_compiler, output, root, run, target_dir};
-use hgrid_tests::symbols::symbols;
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
 

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use hgrid_program_tests::symbols::{symbols, symbols_of_ours};
 use hgrid_tests::artefact::{Flavour, root};
-use hgrid_tests::symbols::{symbols, symbols_of_ours};
 use hgrid_tests::tools::is_installed;
 
 use crate::prefix::{VERSION, assets, dynamic, files, installed};

@@ -17,14 +17,10 @@ pub mod methods;
 pub mod oracle;
 pub mod owned;
 pub mod random;
-#[cfg(feature = "full")]
-pub mod readme;
 pub mod reference;
 #[cfg(feature = "full")]
 pub mod scans;
 pub mod scenes;
-#[cfg(feature = "full")]
-pub mod symbols;
 #[cfg(feature = "full")]
 pub mod tools;
 

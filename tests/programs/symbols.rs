@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::artefact::run;
-use crate::tools::command;
+use hgrid_tests::artefact::run;
+use hgrid_tests::tools::command;
 
 /// Returns the symbols that `nm` lists with these flags.
 ///

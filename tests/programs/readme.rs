@@ -4,7 +4,7 @@
 use std::fs;
 use std::sync::{Mutex, PoisonError};
 
-use crate::artefact::root;
+use hgrid_tests::artefact::root;
 
 const PAGE: &str = "docs/embedded.md";
 
