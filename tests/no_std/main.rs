@@ -78,10 +78,10 @@ fn build(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
     let first = only("one-level");
     if arguments == first {
         // Host dependencies are compiled already, for the C library.
-        start_with(&dir.join("release"), library_dir());
+        start_with(&dir.join("release"), library_dir);
     } else {
         build(target, &[if target == BROWSER { MICROCONTROLLER } else { BROWSER }], &first);
-        start_with(&dir, &folder.join(first[2]));
+        start_with(&dir, || folder.join(first[2]));
     }
     let others = others.iter().copied().filter(|other| rustlib(other).join("lib").is_dir());
     let mut build = cargo_in(&dir, "build");

@@ -168,7 +168,7 @@ fn debug_build(flavour: Flavour) -> DebugBuild {
 /// Builds both libraries with some features in a folder of this name, and returns their folder.
 fn build_beside(name: &str, features: &[&str]) -> PathBuf {
     let dir = target_dir().join("libraries").join(name);
-    start_with(&dir.join("release"), library_dir());
+    start_with(&dir.join("release"), library_dir);
     build(&dir, features)
 }
 
@@ -178,12 +178,12 @@ fn build(target_dir: &Path, features: &[&str]) -> PathBuf {
     target_dir.join("release")
 }
 
-/// Copies a target folder of cargo, unless the copy is there, so that dependencies are not compiled again. No cargo may
-/// work in the folder meanwhile.
+/// Copies a target folder of cargo, unless the copy is there, so that dependencies are not compiled again. `compiled`
+/// returns the folder once no cargo works in it; with a copy, nobody waits for that.
 ///
 /// # Panics
 /// If there is no such folder, or the copy cannot be written.
-pub fn start_with(copy: &Path, compiled: &Path) {
+pub fn start_with<P: AsRef<Path>>(copy: &Path, compiled: impl FnOnce() -> P) {
     let parent = copy.parent().expect("a folder in another");
     fs::create_dir_all(parent).expect("a folder");
     let place = File::create(parent.join("lock")).expect("a lock");
@@ -193,7 +193,7 @@ pub fn start_with(copy: &Path, compiled: &Path) {
         let part = parent.join("part");
         run(Command::new("rm").arg("-rf").arg(&part));
         // cargo goes by the times of files, which -p keeps.
-        run(Command::new("cp").arg("-pR").arg(compiled).arg(&part));
+        run(Command::new("cp").arg("-pR").arg(compiled().as_ref()).arg(&part));
         fs::rename(part, copy).expect("a folder");
     }
 }
