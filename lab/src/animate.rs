@@ -45,14 +45,6 @@ const WAVELENGTH: f64 = 0.3;
 /// # Errors
 /// If the scene cannot be loaded or built, no picture shows anything, or a picture cannot be written.
 pub fn run(args: &AnimateArgs) -> Result<()> {
-    for (option, is_there) in [("--instances", args.instances > 0), ("--refit", args.refit)] {
-        let is_known = !is_there || args.method == Method::Bvh;
-        ensure!(is_known, "{option} is for --method bvh: ask for that, or leave out {option}");
-    }
-    ensure!(
-        !args.refit || args.frames > 1,
-        "--refit is for later frames than the first: ask for --frames 2 or more, or leave out --refit"
-    );
     let scene = Scene::load(&args.scene)?;
     let name = args.scene.display();
     ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");

@@ -5,6 +5,7 @@ mod help;
 mod picture;
 pub mod render;
 mod tuning;
+mod values;
 
 use core::iter;
 use std::ffi::OsString;
@@ -23,11 +24,12 @@ use self::help::{
 pub use self::picture::Picture;
 use self::render::RenderArgs;
 pub use self::tuning::Tuning;
-use self::tuning::{method_parser, quality_parser, thread_parser, whole};
+use self::values::{density, method_parser, output_parser, quality_parser, thread_parser, whole};
 use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
 use crate::compare::shown::Shown;
 use crate::compare::workloads::Workload;
+use crate::scene::format::Format;
 
 /// The picture that is written by default.
 pub const DEFAULT_OUTPUT: &str = "hgrid.png";
@@ -56,7 +58,7 @@ impl Cli {
     /// Parses the words after the program's name; without a command they are those of `render`.
     ///
     /// # Errors
-    /// If the words are not understood, and if they ask for help or the version.
+    /// If the words are not understood or contradict each other, and if they ask for help or the version.
     pub fn of_words(words: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let mut words: Vec<OsString> = words.into_iter().collect();
         let is_own = |word: &OsString| {
@@ -66,6 +68,7 @@ impl Cli {
         };
         let parse = |words: &[OsString]| {
             Self::try_parse_from(iter::once("hgrid".into()).chain(words.iter().cloned()))
+                .and_then(Self::checked)
                 .map_err(|error| with_two_scenes(error, words))
         };
         if words.first().is_some_and(is_own) {
@@ -85,6 +88,23 @@ impl Cli {
                 Err(Self::command().error(ErrorKind::InvalidSubcommand, message))
             }
             _ => parsed,
+        }
+    }
+
+    /// Refuses options that have no effect or contradict each other.
+    fn checked(self) -> Result<Self, clap::Error> {
+        let checked = match &self.command {
+            Command::Render(args) => args.check(),
+            Command::Pack(args) => args.check(),
+            Command::Table(args) => args.race.check(),
+            Command::Figures(args) => args.check(),
+            Command::Animate(args) => args.check(),
+            Command::Compare(args) => args.check(),
+            _ => Ok(()),
+        };
+        match checked {
+            Ok(()) => Ok(self),
+            Err(error) => Err(Self::command().error(ErrorKind::ArgumentConflict, error)),
         }
     }
 }
@@ -180,18 +200,32 @@ pub struct FiguresArgs {
     #[arg(required = true)]
     pub scenes: Vec<OsString>,
     /// The folder for the pictures and their numbers; it is made if it is missing
-    #[arg(short, long, value_name = "DIR", default_value = DEFAULT_FOLDER)]
+    #[arg(short, long, value_name = "DIR", default_value = DEFAULT_FOLDER, value_parser = output_parser())]
     pub output: PathBuf,
     /// The scene of figure 1 [default: the first one]
     #[arg(long, value_name = "SCENE")]
     pub figure1: Option<OsString>,
-    /// The densities of figure 1, between commas
-    #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_delimiter = ',',
+    /// The densities of figure 1, between commas; each is a number above 0
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_delimiter = ',', value_parser = density,
           default_values_t = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])]
     pub densities: Vec<f32>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub race: Race,
+}
+
+impl FiguresArgs {
+    /// Refuses trees alone, and parameters of methods that do not compete.
+    ///
+    /// # Errors
+    /// If there are such; the message says what to change.
+    pub fn check(&self) -> anyhow::Result<()> {
+        ensure!(
+            self.race.configs().iter().any(|config| config.parameters.density().is_some()),
+            "figure 1 shows densities, which bvh has none of: add another of --methods"
+        );
+        self.race.check()
+    }
 }
 
 /// The arguments of `hgrid animate`.
@@ -228,8 +262,26 @@ pub struct AnimateArgs {
     #[arg(long)]
     pub json: bool,
     /// Write every frame into this folder, as PNG; it is made if it is missing
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = output_parser())]
     pub output: Option<PathBuf>,
+}
+
+impl AnimateArgs {
+    /// Refuses options that would have no effect.
+    ///
+    /// # Errors
+    /// If there is one; the message names the option and its purpose.
+    pub fn check(&self) -> anyhow::Result<()> {
+        for (option, is_there) in [("--instances", self.instances > 0), ("--refit", self.refit)] {
+            let is_known = !is_there || self.method == Method::Bvh;
+            ensure!(is_known, "{option} is for --method bvh: ask for that, or leave out {option}");
+        }
+        ensure!(
+            !self.refit || self.frames > 1,
+            "--refit is for later frames than the first: ask for --frames 2 or more, or leave out --refit"
+        );
+        self.tuning.check("--method", &[self.method])
+    }
 }
 
 /// The arguments of `hgrid compare`.
@@ -268,25 +320,38 @@ pub struct CompareArgs {
     #[arg(long)]
     pub markdown: bool,
     /// Write every number and the machine they come from to this file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output_parser())]
     pub json: Option<PathBuf>,
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = output_parser())]
     pub output: Option<PathBuf>,
 }
 
 impl CompareArgs {
-    /// Refuses a quality without a tree that could have it.
+    /// Refuses options for trees without a tree among the methods, and results in place of a mesh.
     ///
     /// # Errors
     /// If there is one; the message names the option and its method.
     pub fn check(&self) -> anyhow::Result<()> {
+        let has_tree = self.methods.is_empty() || self.methods.contains(&Method::Bvh);
         ensure!(
-            self.quality.is_none()
-                || self.methods.is_empty()
-                || self.methods.contains(&Method::Bvh),
+            self.quality.is_none() || has_tree,
             "--quality is for --methods bvh: ask for that, or leave out --quality"
         );
+        // In other commands --json takes no value, so users may type a mesh after it.
+        if let Some(json) = &self.json {
+            ensure!(
+                Format::named(json).is_none(),
+                "`{}` is named like a mesh: give --json a name like x.json",
+                json.display()
+            );
+        }
+        if let Some((option, _)) = self.shown().option() {
+            ensure!(
+                has_tree,
+                "{option} is for bvh and Embree: add bvh to --methods, or leave out {option}"
+            );
+        }
         Ok(())
     }
 

@@ -14,21 +14,6 @@ use anyhow::{Context as _, Error, Result, ensure};
 use crate::scene::gltf::files_of;
 use crate::shade::Rgb;
 
-/// Refuses a path where no PNG can be written, or whose name promises another format.
-///
-/// # Errors
-/// The errors of [`check_writable`], and one if the name has the ending of another format.
-pub fn check_picture(path: &Path) -> Result<()> {
-    let is_png = path.extension().is_none_or(|ending| ending.eq_ignore_ascii_case("png"));
-    ensure!(
-        is_png,
-        "cannot write `{}`: pictures are PNG, so name it {}",
-        path.display(),
-        path.with_extension("png").display()
-    );
-    check_writable(path)
-}
-
 /// Refuses a path where no file can be written. An existing file stays as it is.
 ///
 /// # Errors
@@ -138,12 +123,6 @@ mod tests {
         assert_eq!((info.width, info.height), (3, 2));
         assert_eq!(read, pixels.as_flattened());
         assert!(encode((3, 2), &pixels[1..]).is_err());
-    }
-
-    #[test]
-    fn other_formats_are_refused() {
-        let message = check_picture(Path::new("no/x.JPG")).unwrap_err().to_string();
-        assert_eq!(message, "cannot write `no/x.JPG`: pictures are PNG, so name it no/x.png");
     }
 
     #[test]

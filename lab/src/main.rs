@@ -15,11 +15,9 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Pack(args) => pack::run(&args),
         Command::Validate(args) => validate::run(&args),
-        Command::Table(args) => args.race.check().and_then(|()| table::run(&args)),
-        Command::Figures(args) => args.race.check().and_then(|()| figures::run(&args)),
-        Command::Animate(args) => {
-            args.tuning.check("--method", &[args.method]).and_then(|()| animate::run(&args))
-        }
+        Command::Table(args) => table::run(&args),
+        Command::Figures(args) => figures::run(&args),
+        Command::Animate(args) => animate::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Report(args) => pages::run(&args),
         Command::FirstBuild(args) => compare::first::run(&args),

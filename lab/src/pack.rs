@@ -5,10 +5,9 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
 
-use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Config, Grid, Parameters, TriangleMesh};
+use anyhow::{Context as _, Result};
+use hgrid_core::{Config, Grid, TriangleMesh};
 use indicatif::HumanCount;
 
 use crate::blob::Blob;
@@ -17,7 +16,6 @@ use crate::image::{check_sources, check_writable};
 use crate::plural::triangles;
 use crate::regions::Regions;
 use crate::scene::Scene;
-use crate::scene::format::Format;
 
 /// Bytes in a line of C.
 const IN_LINE: usize = 24;
@@ -27,7 +25,6 @@ const IN_LINE: usize = 24;
 /// # Errors
 /// If the scene cannot be loaded or built, or the file cannot be written.
 pub fn run(args: &PackArgs) -> Result<()> {
-    check(args)?;
     check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
@@ -58,68 +55,6 @@ pub fn run(args: &PackArgs) -> Result<()> {
         "wrote {output}: {bytes} bytes, a grid by {method} and its mesh of {triangles}{note}"
     )?;
     Ok(())
-}
-
-/// Refuses options without effect, and output names that are those of other formats.
-fn check(args: &PackArgs) -> Result<()> {
-    let (method, output) = (args.method, args.output.display());
-    ensure!(
-        args.density.is_none() || Parameters::new(method).density().is_some(),
-        "--density is not for {}, which has none: name another --method, or leave it out",
-        method.name()
-    );
-    args.tuning.check("--method", &[method])?;
-    let is_mesh = Format::named(&args.output).is_some_and(|format| format != Format::Blob);
-    ensure!(!is_mesh, "`{output}` would be a mesh by its name: name a file like x.hgrid or x.c");
-    let pictures = ["png", "jpg", "jpeg", "svg", "gif", "webp", "bmp", "ppm", "exr", "hdr"];
-    let is_picture = args
-        .output
-        .extension()
-        .is_some_and(|ending| pictures.iter().any(|picture| ending.eq_ignore_ascii_case(picture)));
-    ensure!(
-        !is_picture,
-        "`{output}` would be a picture by its name: name a file like x.hgrid, or draw one with \
-         hgrid render"
-    );
-    let is_source = |path: &Path| {
-        let endings = ["c", "h", "cpp", "hpp", "cc"];
-        path.extension().is_some_and(|ending| endings.iter().any(|source| ending == *source))
-    };
-    match &args.c_array {
-        None => {
-            ensure!(!is_source(&args.output), "`{output}` is C by its name: add --c-array NAME");
-        }
-        Some(name) => {
-            ensure!(
-                is_source(&args.output),
-                "`{output}` is not C by its name: name a file like x.c"
-            );
-            ensure!(is_identifier(name), "`{name}` is no name in C: take letters, digits and _");
-            ensure!(!is_reserved(name), "`{name}` has a meaning in C or C++: take another name");
-        }
-    }
-    Ok(())
-}
-
-fn is_identifier(name: &str) -> bool {
-    let is_word = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-    is_word && name.bytes().next().is_some_and(|first| !first.is_ascii_digit())
-}
-
-/// The words of C and C++ that can be no names, and the function that every program has.
-const RESERVED: &str = "\
-    _Alignas _Alignof _Atomic _BitInt _Bool _Complex _Decimal128 _Decimal32 _Decimal64 _Generic _Imaginary \
-    _Noreturn _Static_assert _Thread_local alignas alignof and and_eq asm auto bitand bitor bool break case \
-    catch char char16_t char32_t char8_t class co_await co_return co_yield compl concept const const_cast \
-    consteval constexpr constinit continue decltype default delete do double dynamic_cast else enum explicit \
-    export extern false float for friend goto if inline int long main mutable namespace new noexcept not \
-    not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires restrict \
-    return short signed sizeof static static_assert static_cast struct switch template this thread_local \
-    throw true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile \
-    wchar_t while xor xor_eq";
-
-fn is_reserved(name: &str) -> bool {
-    RESERVED.split(' ').any(|word| word == name)
 }
 
 /// Builds a grid of a scene and writes both into one blob.

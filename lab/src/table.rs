@@ -326,10 +326,8 @@ mod tests {
 
     #[test]
     fn failures_name_the_scene() {
-        for words in ["no/such.ply", "procedural:knot:500 --size 16 --macrocell-factor 1"] {
-            let message = format!("{:#}", results(words).unwrap_err());
-            assert!(message.contains(words.split(' ').next().unwrap()), "{message}");
-        }
+        let message = format!("{:#}", results("no/such.ply").unwrap_err());
+        assert!(message.contains("no/such.ply"), "{message}");
     }
 
     #[test]

@@ -40,6 +40,16 @@ impl Folder {
         assert!(!output.status.success() && output.stdout.is_empty(), "{words}");
         Ok(String::from_utf8_lossy(&output.stderr).into_owned())
     }
+
+    /// Returns the message of a command whose words are refused, and which leaves the folder as it is.
+    fn refuses(&self, words: &str) -> io::Result<String> {
+        let names = || fs::read_dir(&self.0).map(Iterator::count);
+        let before = names()?;
+        let message = self.fails(words)?;
+        assert_eq!(self.hgrid(words)?.status.code(), Some(2), "{words}");
+        assert_eq!(names()?, before, "{words}");
+        Ok(message)
+    }
 }
 
 impl Drop for Folder {
@@ -331,13 +341,36 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o b.c --c-array int", "`int` has a meaning in C or C++: take another name"),
         ("pack a.obj -o b.c --c-array _Bool", "`_Bool` has a meaning in C or C++"),
         ("pack a.obj -o b.c --c-array class", "`class` has a meaning"),
-        ("pack a.obj -o b.ply", "would be a mesh by its name"),
-        ("pack a.obj -o b.PNG", "would be a picture by its name"),
+        ("pack a.obj -o b.ply", "`b.ply` would be no blob by its name: name a file like x.hgrid"),
+        ("pack a.obj -o b.PNG", "`b.PNG` would be no blob by its name"),
+        ("pack a.obj -o keep.txt", "`keep.txt` would be no blob by its name"),
+        ("pack a.obj -o -", "it cannot be standard output: name a file"),
         ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),
     ] {
-        let message = folder.fails(words).unwrap();
+        let message = folder.refuses(words).unwrap();
         assert!(message.contains(expected), "{message}");
     }
+}
+
+#[test]
+fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
+    let folder = Folder::new("usage").unwrap();
+    for (words, expected) in [
+        ("a.obj -o -", "it cannot be standard output: name a file"),
+        ("a.obj -o a.jpg", "pictures are PNG, so name it a.png"),
+        ("a.obj --density x --method fixed", "a density is a number above 0, like 4 or 0.5"),
+        ("a.obj --density 4", "--density is not for bvh"),
+        ("figures a.obj --methods bvh", "figure 1 shows densities, which bvh has none of"),
+        ("figures a.obj --densities 0", "a density is a number above 0"),
+        ("animate a.obj --method fixed --refit -o b", "--refit is for --method bvh"),
+        ("compare a.obj --methods fixed --spheres -o b", "cannot be used with"),
+        ("compare a.obj --methods fixed --spheres", "--spheres is for bvh and Embree: add bvh"),
+    ] {
+        let message = folder.refuses(words).unwrap();
+        assert!(message.contains(expected), "{words}: {message}");
+    }
+    // What only the file can tell is another failure.
+    assert_eq!(folder.hgrid("render nothing.ply").unwrap().status.code(), Some(1));
 }
 
 #[test]

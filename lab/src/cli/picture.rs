@@ -3,7 +3,7 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
-use super::tuning::whole;
+use super::values::whole;
 use crate::camera::{Aim, Camera, Lens, Point, Up, View, viewpoint};
 use crate::scene::Scene;
 use crate::tiles::Tiles;
@@ -12,7 +12,7 @@ use crate::world::World;
 /// The size of a picture, and its camera.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Picture {
-    /// Pixels on each side
+    /// Pixels on each side, 1 to 16384
     #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value_t = 1024,
           value_parser = whole(1..=16_384_u16))]
     pub size: u16,
@@ -25,7 +25,7 @@ pub struct Picture {
     /// Look at this point [default: the middle of the scene]
     #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
     pub target: Option<Point>,
-    /// Degrees that the picture covers, from edge to edge [default: 40, in a room 70]
+    /// Degrees that the picture covers, from edge to edge, 1 to 120 [default: 40, in a room 70]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub fov: Option<Lens>,
     /// Which axis of the scene is up [default: y, or z for STL and what lies flat on x and y]

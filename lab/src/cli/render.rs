@@ -9,8 +9,8 @@ use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
 use hgrid_core::{Config, Control, Method};
 
-use super::tuning::whole;
-use super::{DEFAULT_OUTPUT, DEFAULT_SCENE, Picture, Tuning, method_parser, thread_parser};
+use super::values::{density, method_parser, picture_parser, thread_parser, whole};
+use super::{DEFAULT_OUTPUT, DEFAULT_SCENE, Picture, Tuning};
 use crate::heat::Counter;
 use crate::light::Lights;
 
@@ -25,7 +25,8 @@ pub struct RenderArgs {
     #[arg(default_value = DEFAULT_SCENE)]
     pub scene: OsString,
     /// The picture to write, as PNG
-    #[arg(short, long, value_name = "FILE.png", default_value = DEFAULT_OUTPUT)]
+    #[arg(short, long, value_name = "FILE.png", default_value = DEFAULT_OUTPUT,
+          value_parser = picture_parser())]
     pub output: PathBuf,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
@@ -33,11 +34,12 @@ pub struct RenderArgs {
     /// Meaning of the colours
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
-    /// Rays through each pixel, against jagged edges and noise [default: 4; 1 for the four grids of the paper]
+    /// Rays through each pixel, against jagged edges and noise, 1 to 1024 [default: 4; 1 for the paper's four grids]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           value_parser = whole(1..=1024_u16))]
     samples: Option<u16>,
-    /// Rays of ambient occlusion from each sample, 0 for none [default: 16 a pixel; 0 for the four grids of the paper]
+    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: 16 a pixel; 0 for the paper's four
+    /// grids]
     #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
           value_parser = whole(0..=1024_u16))]
     ao: Option<u16>,
@@ -53,13 +55,13 @@ pub struct RenderArgs {
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
     pub method: Method,
-    /// Cells per triangle, for other methods than bvh [default: the paper's for the method]
-    #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
+    /// Cells per triangle, for other methods than bvh, a number above 0 [default: the paper's for the method]
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_parser = density)]
     pub density: Option<f32>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub tuning: Tuning,
-    /// Threads that render and, for bvh, build [default: one for each core]
+    /// Threads that render and, for bvh, build, 1 to 64 [default: one for each core]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = thread_parser())]
     threads: Option<u32>,
     /// Print the numbers as a JSON object

@@ -22,6 +22,19 @@ fn bad_values_are_refused() {
         "render --fov 0",
         "compare a.ply --eye 1,2,3 --view inside",
         "render --density many",
+        "render --density 0",
+        "render --density inf",
+        "pack a.ply -o a.hgrid --density nan",
+        "figures a.ply --densities 4,0",
+        "render -o -",
+        "render -o a.jpg",
+        "pack a.ply -o -",
+        "animate -o -",
+        "figures a.ply -o -",
+        "compare a.ply -o -",
+        "compare a.ply --json -",
+        "render --macrocell-factor 1",
+        "render --depth 5",
         "render --method octree",
         "render --macrocell-factor -1",
         "table",
@@ -71,7 +84,9 @@ fn numbers_that_are_not_whole_are_refused_by_their_range() {
         ("render --size 100000000000000000000", "is not in 1..=16384"),
         ("render --threads 1.5", "it is no whole number from 1 to 64"),
         ("render --heat-top 0", "0 is not in 1..=4294967295"),
-        ("render --depth two", "it is no whole number from 0 to 4294967295"),
+        ("render --depth two", "it is no whole number from 1 to 4"),
+        ("render --depth 5", "5 is not in 1..=4"),
+        ("render --macrocell-factor 1", "1 is not in 2..=4294967295"),
         ("table a.ply --repeat NaN", "it is no whole number from 1 to 1000"),
     ] {
         let words = ["hgrid"].into_iter().chain(words.split(' '));
@@ -156,14 +171,34 @@ fn parameters_of_others_are_refused() {
     assert!(message.contains("--quality is for --methods bvh"), "{message}");
 }
 
+/// Options that are refused together, wherever the error is found, end with the status of a wrong command line.
+#[test]
+fn options_without_effect_are_refused_with_the_words() {
+    for (words, expected) in [
+        ("a.ply --density 8", "--density is not for bvh"),
+        ("a.ply --samples 4 --shading heat", "--samples is not for --shading heat"),
+        ("pack a.ply -o a.hgrid --density 8", "--density is not for bvh"),
+        ("pack a.ply -o a.c", "add --c-array NAME"),
+        ("table a.ply --methods bvh --depth 1", "--depth is for --methods recursive"),
+        ("figures a.ply --methods bvh", "add another of --methods"),
+        ("figures a.ply --methods fixed --depth 1", "--depth is for --methods recursive"),
+        ("animate --method fixed --refit", "--refit is for --method bvh"),
+        ("animate --depth 1", "--depth is for --method recursive"),
+        ("compare a.ply --methods fixed --quality high", "--quality is for --methods bvh"),
+        ("compare a.ply --methods fixed --spheres", "add bvh to --methods"),
+        ("compare a.ply --methods fixed --instances 2", "add bvh to --methods"),
+    ] {
+        let error = Cli::of_words(words.split(' ').map(OsString::from)).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{words}");
+        assert!(error.to_string().contains(expected), "{words}: {error}");
+    }
+}
+
 #[test]
 fn negative_values_are_values() {
-    for words in [
-        "--view -30,-20",
-        "--eye -1,-2,-3 --target -1,0,0 --fov 60",
-        "--view inside --fov 20.5",
-        "--density -1",
-    ] {
+    for words in
+        ["--view -30,-20", "--eye -1,-2,-3 --target -1,0,0 --fov 60", "--view inside --fov 20.5"]
+    {
         let words = ["hgrid", "render"].into_iter().chain(words.split(' '));
         Cli::try_parse_from(words).unwrap();
     }

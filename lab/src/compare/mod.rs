@@ -48,7 +48,6 @@ use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
 use crate::image::{check_sources, check_writable, make_folder};
-use crate::scene::format::Format;
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
@@ -63,7 +62,6 @@ use workloads::{Amount, Workload};
 /// If this program was built without the peers, a scene cannot be loaded, a structure cannot be
 /// built, two methods of hgrid disagree, or a file cannot be written.
 pub fn run(args: &CompareArgs) -> Result<()> {
-    args.check()?;
     if let Some(path) = &args.json {
         check_results(path, &args.scenes)?;
     }
@@ -96,13 +94,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// Refuses to write results over a mesh. In other commands --json takes no value, so users may type a mesh after it.
+/// Refuses to write results over a mesh.
 fn check_results(path: &Path, scenes: &[OsString]) -> Result<()> {
-    ensure!(
-        Format::named(path).is_none(),
-        "`{}` is named like a mesh: give --json a name like x.json",
-        path.display()
-    );
     for scene in scenes {
         check_sources(path, scene, "results")?;
     }

@@ -55,10 +55,6 @@ impl Curves {
         let with_density =
             |config: &Config| Some((config.parameters, config.parameters.density()?));
         let methods: Vec<_> = configs.iter().filter_map(with_density).collect();
-        ensure!(
-            !methods.is_empty(),
-            "figure 1 shows densities, which bvh has none of: add another of --methods"
-        );
         let at_densities = |&(parameters, _): &(Parameters, f32)| {
             args.densities.iter().map(move |&density| parameters.with_density(density).into())
         };

@@ -100,13 +100,6 @@ mod tests {
     }
 
     #[test]
-    fn trees_alone_have_no_figure_1() {
-        let args = FiguresArgs::parse_from(["hgrid", "procedural:knot:800", "--methods", "bvh"]);
-        let message = density::Curves::measure(&args).unwrap_err().to_string();
-        assert!(message.contains("add another of --methods"), "{message}");
-    }
-
-    #[test]
     fn methods_differ_in_colour() {
         let colors: Vec<_> = Method::ALL.iter().map(|method| color_of(method.name())).collect();
         assert!(colors.iter().all(|a| colors.iter().filter(|b| a == *b).count() == 1));
