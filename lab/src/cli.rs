@@ -234,7 +234,7 @@ pub struct AnimateArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
     #[arg(default_value = DEFAULT_SCENE)]
     pub scene: OsString,
-    /// Number of frames
+    /// Number of frames, 1 to 100000
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 30,
           value_parser = whole(1..=100_000_u32))]
     pub frames: u32,
@@ -244,14 +244,15 @@ pub struct AnimateArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub tuning: Tuning,
-    /// Show a field of so many moving instances of the mesh, in a scene that is built for every frame, too
+    /// Show a field of so many moving instances of the mesh, in a scene that is built for every frame, too; at most
+    /// 10000000
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0,
           value_parser = whole(0..=10_000_000_u32))]
     pub instances: u32,
     /// From the second frame on, give the trees of the first one their new boxes, for `bvh`
     #[arg(long)]
     pub refit: bool,
-    /// Threads that build, for `bvh`, and render
+    /// Threads that build, for `bvh`, and render, 1 to 64
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,
@@ -302,14 +303,15 @@ pub struct CompareArgs {
     /// The rays and points to ask for, between commas [default: all]
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
-    /// Compare scenes of this many instances of the mesh (`bvh` and Embree only); 0 compares the mesh itself
+    /// Compare scenes of this many instances of the mesh, at most 10000000 (`bvh` and Embree only); 0 compares the mesh
+    /// itself
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0, conflicts_with = "output",
           value_parser = whole(0..=10_000_000_u32))]
     pub instances: u32,
     /// Compare trees over spheres, a shape of the caller's own, in place of triangles (`bvh` and Embree only)
     #[arg(long, conflicts_with_all = ["instances", "output"])]
     pub spheres: bool,
-    /// Build and trace so many times, taking turns, and report the medians
+    /// Build and trace so many times, 1 to 1000, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 5,
           value_parser = whole(1..=1000_u32))]
     pub repeat: u32,
@@ -402,7 +404,7 @@ pub struct Race {
     /// The structures to build, between commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     methods: Vec<Method>,
-    /// Build and render so many times, taking turns, and report the medians
+    /// Build and render so many times, 1 to 1000, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 3,
           value_parser = whole(1..=1000_u32))]
     pub repeat: u32,
@@ -442,7 +444,7 @@ impl Race {
 /// The threads of builds.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Builders {
-    /// Threads that build, for `bvh`; the other methods, and all rays, have one
+    /// Threads that build, 1 to 64, for `bvh`; the other methods, and all rays, have one
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,

@@ -34,12 +34,13 @@ pub struct RenderArgs {
     /// Meaning of the colours
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
-    /// Rays through each pixel, against jagged edges and noise, 1 to 1024 [default: 4; 1 for the paper's four grids]
+    /// Rays through each pixel, against jagged edges and noise, 1 to 1024 [default: 4; 1 for the four grids of the
+    /// paper]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           value_parser = whole(1..=1024_u16))]
     samples: Option<u16>,
-    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: 16 a pixel; 0 for the paper's four
-    /// grids]
+    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: 16 a pixel; 0 for the four
+    /// grids of the paper]
     #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
           value_parser = whole(0..=1024_u16))]
     ao: Option<u16>,
@@ -49,7 +50,7 @@ pub struct RenderArgs {
     /// For heat: the work that is shown [default: cost]
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,
-    /// For heat: the number that is red, to compare pictures [default: what 99 of 100 rays take]
+    /// For heat: the number that is red, 1 or more, to compare pictures [default: what 99 of 100 rays take]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = whole(1..=u32::MAX))]
     pub heat_top: Option<u32>,
     /// The structure to build

@@ -95,6 +95,45 @@ fn numbers_that_are_not_whole_are_refused_by_their_range() {
     }
 }
 
+/// The help of an option names the limit that its parser has: the next number is refused by that limit.
+#[test]
+fn the_help_names_limits() {
+    let of_help = |command: &str, option: &str| {
+        let cli = Cli::command();
+        let command = cli.find_subcommand(command).unwrap();
+        let mut options = command.get_arguments().filter_map(|it| Some((it.get_long()?, it)));
+        let (_, argument) = options.find(|(long, _)| *long == option).unwrap();
+        argument.get_help().unwrap().to_string()
+    };
+    for (words, limit) in [
+        ("render --size 16385", "16384"),
+        ("render --samples 1025", "1 to 1024"),
+        ("render --ao 1025", "at most 1024"),
+        ("render --threads 65", "1 to 64"),
+        ("render --heat-top 0", "1 or more"),
+        ("render --fov 121", "1 to 120"),
+        ("render --density 0", "above 0"),
+        ("render --macrocell-factor 1", "2 or more"),
+        ("render --depth 5", "1 to 4"),
+        ("pack --density 0", "above 0"),
+        ("figures --densities 0", "above 0"),
+        ("table --threads 65", "1 to 64"),
+        ("table --repeat 1001", "1 to 1000"),
+        ("animate --frames 100001", "1 to 100000"),
+        ("animate --instances 10000001", "at most 10000000"),
+        ("animate --threads 65", "1 to 64"),
+        ("compare --repeat 1001", "1 to 1000"),
+        ("compare --instances 10000001", "at most 10000000"),
+    ] {
+        let said: Vec<_> = ["hgrid"].into_iter().chain(words.split(' ')).collect();
+        let error = Cli::try_parse_from(&said).unwrap_err();
+        let is_value = matches!(error.kind(), ErrorKind::ValueValidation);
+        assert!(is_value, "{words}: {error}");
+        let help = of_help(said[1], said[2].trim_start_matches('-'));
+        assert!(help.contains(limit), "{words}: {help}");
+    }
+}
+
 #[test]
 fn a_misspelt_command_is_no_file() {
     let message = |words: &str| {
