@@ -30,7 +30,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     let scene = Scene::load(&args.scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
-    let blob = pack(&scene, &config).with_context(cannot)?;
+    let blob = pack(&scene, &config, args.density).with_context(cannot)?;
     let written = match &args.c_array {
         None => fs::write(&args.output, blob.bytes()),
         Some(name) => File::create(&args.output).and_then(|file| {
@@ -57,11 +57,12 @@ pub fn run(args: &PackArgs) -> Result<()> {
     Ok(())
 }
 
-/// Builds a grid of a scene and writes both into one blob.
-fn pack(scene: &Scene, config: &Config) -> Result<Blob> {
+/// Builds a grid of a scene, with the density that was asked for if one was, and writes both into one blob.
+fn pack(scene: &Scene, config: &Config, density: Option<f32>) -> Result<Blob> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let regions = Regions::build(mesh, config)?;
     let grid = Grid::open(&regions.index, mesh)?;
+    Regions::refuse_thinner(&grid, density)?;
     let mut blob = Blob::zeroed(usize::try_from(grid.packed_bytes())?);
     grid.pack(blob.bytes_mut())?;
     Ok(blob)

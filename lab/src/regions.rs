@@ -1,7 +1,7 @@
 //! The two regions of a grid, and builds in them: first builds in new pages of the system, and rebuilds in
 //! regions that are kept.
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes_with};
 #[cfg(target_os = "linux")]
 use memmap2::Advice;
@@ -9,6 +9,10 @@ use memmap2::{MmapMut, MmapOptions};
 
 use crate::resident::resident_bytes;
 use crate::threads::Threads;
+
+/// The reason why a grid has fewer cells than its configuration asks for: a limit of the core (docs/bounds.md).
+pub(crate) const TOO_DENSE: &str =
+    "asks for more cells than this mesh can have, with at most 16 references to each triangle";
 
 /// The index and the scratch of a grid.
 pub(crate) struct Regions {
@@ -50,6 +54,20 @@ impl Regions {
         let mut regions = Self::mapped(sizes, pages)?;
         Grid::build_with(mesh, config, &mut regions.index, &mut regions.scratch, parallel)?;
         Ok(regions)
+    }
+
+    /// Refuses a grid that has fewer cells than the density that was asked for, if one was.
+    ///
+    /// # Errors
+    /// If it has; the message names the density that it has.
+    pub(crate) fn refuse_thinner(grid: &Grid<'_>, asked: Option<f32>) -> Result<()> {
+        if let Some(asked) = asked
+            && let Some(built) = grid.config().parameters.density()
+            && built < asked
+        {
+            bail!("--density {asked} {TOO_DENSE}: it can have --density {built}");
+        }
+        Ok(())
     }
 
     fn mapped(sizes: Sizes, pages: fn(usize) -> Result<MmapMut>) -> Result<Self> {

@@ -352,6 +352,26 @@ fn a_blob_can_be_an_array_of_c() {
     }
 }
 
+/// A mesh has a density beyond which a build takes fewer cells; nobody gets these in place of what was asked for.
+#[test]
+fn a_density_that_a_mesh_cannot_have_is_refused() {
+    let folder = Folder::new("density").unwrap();
+    let knot = "procedural:knot:2000 --method one-level";
+    for words in ["render --size 16 -o a.png", "pack -o a.hgrid"] {
+        let words = format!("{words} {knot}");
+        folder.says(&format!("{words} --density 32")).unwrap();
+        let said = folder.fails(&format!("{words} --density 128")).unwrap();
+        let expected = "at most 16 references to each triangle: it can have --density 32";
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+    let words = "figures procedural:knot:2000 --size 16 --repeat 1 --methods one-level --densities";
+    let output = folder.hgrid(&format!("{words} 4,64,128,32")).unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.contains("triangle: one-level 64, 128"), "{said}");
+    let picture = fs::read_to_string(folder.0.join("figures/figure1.svg")).unwrap();
+    assert!(picture.contains("\n32\n") && !picture.contains("\n128\n"), "{picture}");
+}
+
 #[test]
 fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
     let folder = Folder::new("usage").unwrap();

@@ -18,6 +18,7 @@ use crate::plot::{
     heading, number,
 };
 use crate::progress::Progress;
+use crate::regions::TOO_DENSE;
 use crate::scene::Scene;
 use crate::table::{display_name, measure_diffuse, times};
 
@@ -81,6 +82,16 @@ impl Curves {
     }
 }
 
+impl Curves {
+    /// Returns a sentence about the densities that the charts do not show; nothing if they show all.
+    pub(super) fn note(&self) -> Option<String> {
+        let left_out: Vec<_> = self.methods.iter().filter_map(Curve::left_out).collect();
+        let densities = left_out.join("; ");
+        (!left_out.is_empty())
+            .then(|| format!("left out of figure 1, because each {TOO_DENSE}: {densities}"))
+    }
+}
+
 impl Curve {
     /// Returns true if the density makes a difference to the method.
     fn is_curve(&self) -> bool {
@@ -91,6 +102,14 @@ impl Curve {
     /// Returns the points whose grids are as dense as they were configured to be.
     fn points(&self) -> impl Iterator<Item = &Measurement> {
         self.points.iter().filter(|point| point.density >= point.configured_density)
+    }
+
+    /// Returns the other densities, with the name of the method; nothing if there are none.
+    fn left_out(&self) -> Option<String> {
+        let thinner = self.points.iter().filter(|point| point.density < point.configured_density);
+        let densities: Vec<_> =
+            thinner.filter_map(|point| Some(point.configured_density?.to_string())).collect();
+        (!densities.is_empty()).then(|| format!("{} {}", self.method, densities.join(", ")))
     }
 }
 
@@ -127,8 +146,7 @@ impl Figure<'_> {
         let curves = self.curves();
         let points = || curves.iter().flat_map(|curve| curve.points());
         let seconds = points().flat_map(|point| TIMES.map(|(_, _, time)| time(point)));
-        let densities = curves.iter().flat_map(|curve| &curve.points);
-        let mut names: Vec<_> = densities
+        let mut names: Vec<_> = points()
             .filter_map(|point| point.configured_density.map(f64::from))
             .map(|density| (density.log2(), number(density)))
             .collect();

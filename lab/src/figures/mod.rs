@@ -30,6 +30,9 @@ pub fn run(args: &FiguresArgs) -> Result<()> {
 
     let curves = density::Curves::measure(args)?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;
+    if let Some(note) = curves.note() {
+        writeln!(io::stderr(), "{note}")?;
+    }
     let results = Results::measure(&args.scenes, &args.race)?;
     write(&bars::Figure(&results), &results, folder, "figure2")?;
 

@@ -19,23 +19,23 @@ pub(super) struct Built {
     pub(super) instances: usize,
 }
 
-/// Builds, and calls `then` with the result.
+/// Builds with a configuration, and with the density that was asked for if one was, and calls `then` with the result.
 pub(super) fn build<T>(
     scene: &Scene,
     model: Option<&Model>,
-    config: &Config,
+    (config, density): (&Config, Option<f32>),
     threads: &Threads,
     then: impl FnOnce(World<'_>, Built) -> Result<T>,
 ) -> Result<T> {
     match model {
-        None => build_mesh(scene, config, threads, then),
+        None => build_mesh(scene, (config, density), threads, then),
         Some(model) => build_instances(model, config, threads, then),
     }
 }
 
 fn build_mesh<T>(
     scene: &Scene,
-    config: &Config,
+    (config, density): (&Config, Option<f32>),
     threads: &Threads,
     then: impl FnOnce(World<'_>, Built) -> Result<T>,
 ) -> Result<T> {
@@ -45,6 +45,7 @@ fn build_mesh<T>(
     let index = threads.parallel(|parallel| Regions::fresh(mesh, config, parallel))?.index;
     let seconds = start.elapsed().as_secs_f64();
     let grid = Grid::open(&index, mesh)?;
+    Regions::refuse_thinner(&grid, density)?;
     let built = Built {
         seconds,
         index_bytes: grid.blob_bytes(),

@@ -68,7 +68,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         let outcome = draw(args, &scene, world, tiles, lights, &threads)?;
         Ok((built, outcome, start.elapsed().as_secs_f64()))
     };
-    let rendered = build(&scene, model.as_ref(), &args.config(), &threads, render);
+    let rendered = build(&scene, model.as_ref(), (&args.config(), args.density), &threads, render);
     let (built, outcome, render_seconds) = rendered.with_context(none)?;
     ensure!(outcome.hits > 0, "{}: {}", none(), unseen(&args.picture, &scene, model.as_ref()));
     let Picture { size, pixels } = outcome.picture;
