@@ -23,6 +23,7 @@ impl Blob {
     pub fn read(path: &Path) -> Result<Self> {
         let mut file = file::open(path)?;
         let length = usize::try_from(file.metadata()?.len()).context("it is too large")?;
+        ensure!(length > 0, "it is empty");
         let mut memory = vec![Block::ZERO; Block::count_for(length)];
         let bytes = &mut Block::bytes_mut(&mut memory)[..length];
         file.read_exact(bytes).context("cannot read it")?;

@@ -134,7 +134,12 @@ fn a_file_alone_is_rendered() {
     assert!(folder.fails("rendr a.obj").unwrap().contains("the nearest command is `render`"));
     assert!(folder.fails("report nope").unwrap().contains("`nope` is no checkout of hgrid"));
     fs::write(folder.0.join("empty.ply"), "").unwrap();
-    assert!(folder.fails("empty.ply").unwrap().contains("`empty.ply`: it is empty"));
+    fs::write(folder.0.join("empty.obj"), "").unwrap();
+    for words in
+        ["empty.ply", "empty.obj", "info empty.ply", "info empty.obj", "validate empty.ply"]
+    {
+        assert!(folder.fails(words).unwrap().contains("`: it is empty"), "{words}");
+    }
     assert!(
         folder
             .fails("hgrid.png")

@@ -59,18 +59,14 @@ impl Format {
     }
 
     fn of_content(start: &[u8], named: Option<Self>) -> Result<Self> {
-        // An OBJ file without a line is one without triangles.
-        ensure!(!start.is_empty() || named == Some(Self::Obj), "it is empty");
+        ensure!(!start.is_empty(), "it is empty");
         if start.starts_with(b"ply") {
             return Ok(Self::Ply);
         }
         if start.starts_with(b"glTF") {
             return Ok(Self::Gltf);
         }
-        if BlobInfo::peek(start)
-            .err()
-            .is_none_or(|error| error != Error::NotAGrid && !start.is_empty())
-        {
+        if BlobInfo::peek(start).err().is_none_or(|error| error != Error::NotAGrid) {
             return Ok(Self::Blob);
         }
         let foreign = foreign(start);
@@ -84,7 +80,7 @@ impl Format {
                 Some(it_is) => Err(anyhow!("{it_is}, not {}", named.article())),
                 None => Ok(named),
             },
-            None if start.trim_ascii_start().starts_with(b"solid") => Ok(Self::Stl),
+            None if stl::starts_with_solid(start) => Ok(Self::Stl),
             None if start.trim_ascii_start().starts_with(b"{") => Ok(Self::Gltf),
             None => {
                 let what = it_is.unwrap_or_else(|| "it has another format".to_owned());
@@ -193,10 +189,10 @@ mod tests {
             (&b"ply\nformat"[..], Some(Format::Obj), Format::Ply),
             (b"glTF\x02\0", None, Format::Gltf),
             (b"solid a", None, Format::Stl),
+            (b"SOLID A", None, Format::Stl),
             (b"P1 bracket", Some(Format::Stl), Format::Stl),
             (b"{ \"asset\"", None, Format::Gltf),
             (b"v 0 0 0", Some(Format::Obj), Format::Obj),
-            (b"", Some(Format::Obj), Format::Obj),
         ] {
             assert_eq!(Format::of_content(start, named).unwrap(), expected);
         }
@@ -206,7 +202,8 @@ mod tests {
     fn another_format_is_named() {
         let message =
             |start: &[u8], named| Format::of_content(start, named).unwrap_err().to_string();
-        for named in [Some(Format::Ply), Some(Format::Blob), Some(Format::Stl), None] {
+        let all = [Format::Ply, Format::Obj, Format::Stl, Format::Gltf, Format::Blob];
+        for named in all.into_iter().map(Some).chain([None]) {
             assert_eq!(message(b"", named), "it is empty");
         }
         assert_eq!(

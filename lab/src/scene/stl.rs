@@ -22,10 +22,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
     let count = count.map(|count| u32::from_le_bytes(*count) as usize);
     let rest = bytes.get(HEADER_BYTES..).unwrap_or_default();
-    let is_text = bytes.trim_ascii_start().starts_with(b"solid");
+    // The count and the last bytes of triangles are nearly always zero somewhere, and text has no zeros.
+    let is_text = starts_with_solid(bytes) && !bytes.contains(&0);
     match count {
         Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => Ok(binary(rest)),
-        _ if is_text => ascii(str::from_utf8(bytes).context("it is neither binary STL nor text")?),
+        // The names of solids may be in any encoding.
+        _ if is_text => ascii(&String::from_utf8_lossy(bytes)),
         // Some programs write more bytes after the last triangle.
         Some(count) => {
             let present = rest.len() / TRIANGLE_BYTES;
@@ -51,34 +53,49 @@ fn binary(triangles: &[u8]) -> Mesh {
     with_positions(positions)
 }
 
+/// Returns true if the first word is `solid`, in small or in capital letters.
+pub(super) fn starts_with_solid(bytes: &[u8]) -> bool {
+    let first = bytes.trim_ascii_start().first_chunk();
+    first.is_some_and(|word: &[u8; 5]| word.eq_ignore_ascii_case(b"solid"))
+}
+
 fn ascii(text: &str) -> Result<Mesh> {
     let mut positions = Vec::new();
     let mut is_complete = true;
-    for (number, line) in (1..).zip(text.lines()) {
-        let mut words = line.split_ascii_whitespace();
-        match words.next() {
-            Some("vertex") => {
-                let corner: Vec<f32> = words.flat_map(str::parse).collect();
-                let corner = <[f32; 3]>::try_from(corner).ok();
-                positions.push(corner.with_context(|| {
-                    format!("line {number}: `vertex` should have three numbers behind it")
-                })?);
-            }
-            Some("endfacet") => ensure!(
-                positions.len() % 3 == 0,
-                "line {number}: a facet has three vertices, this one has not"
-            ),
-            Some("solid") => is_complete = false,
-            Some("endsolid") => is_complete = true,
-            Some("facet" | "outer" | "endloop" | "color") | None => {}
-            Some(word) => bail!("line {number}: `{word}` is no word of an STL file"),
-        }
+    let mut lines = (1..).zip(text.lines()).peekable();
+    while let Some((number, line)) = lines.next() {
+        let result = read_line(line, &mut positions, &mut is_complete);
+        // What is wrong in the last line of a part is what is missing.
+        let is_end = lines.peek().is_none();
+        ensure!(
+            !is_end || (is_complete && positions.len().is_multiple_of(3)),
+            "it is cut off in line {number}: it does not end with `endsolid`"
+        );
+        result.with_context(|| format!("line {number}"))?;
     }
-    ensure!(
-        is_complete && positions.len() % 3 == 0,
-        "it is cut off: it does not end with `endsolid`"
-    );
     Ok(with_positions(positions))
+}
+
+/// Reads a line: a corner, or the start or the end of a solid or a facet.
+fn read_line(line: &str, positions: &mut Vec<[f32; 3]>, is_complete: &mut bool) -> Result<()> {
+    let mut words = line.split_ascii_whitespace();
+    let Some(first) = words.next() else { return Ok(()) };
+    match &*first.to_ascii_lowercase() {
+        "vertex" => {
+            let corner: Vec<f32> = words.flat_map(str::parse).collect();
+            let corner = <[f32; 3]>::try_from(corner).ok();
+            positions.push(corner.context("`vertex` should have three numbers behind it")?);
+        }
+        "endfacet" => {
+            let is_whole = positions.len().is_multiple_of(3);
+            ensure!(is_whole, "a facet has three vertices, this one has not");
+        }
+        "solid" => *is_complete = false,
+        "endsolid" => *is_complete = true,
+        "facet" | "outer" | "endloop" | "color" => {}
+        _ => bail!("`{first}` is no word of an STL file"),
+    }
+    Ok(())
 }
 
 #[expect(
@@ -113,9 +130,14 @@ mod tests {
 
     #[test]
     fn both_encodings_give_one_mesh() {
-        for bytes in
-            [TEXT.as_bytes(), &file(b"solid but binary", 1), &[file(b"", 1), vec![1; 9]].concat()]
-        {
+        for bytes in [
+            TEXT.as_bytes(),
+            TEXT.to_uppercase().as_bytes(),
+            &[b"solid W\xfcrfel", &TEXT.as_bytes()[5..]].concat(),
+            &file(b"solid but binary", 1),
+            &[file(b"", 1), vec![1; 9]].concat(),
+            &[file(b"solid", 1), vec![1; 9]].concat(),
+        ] {
             let mesh = read(bytes).unwrap();
             assert_eq!((&*mesh.positions, &*mesh.indices), (&CORNERS[..], &[[0, 1, 2]][..]));
         }
@@ -127,7 +149,15 @@ mod tests {
     fn damage_is_reported() {
         let message = |bytes: &[u8]| format!("{:#}", read(bytes).unwrap_err());
         assert!(message(&file(b"", 2)[..183]).starts_with("it is cut off after 1 of 2 triangles"));
+        // A part of a binary file is none of text, whatever its first word is.
+        assert!(message(&file(b"solid", 2)[..183]).starts_with("it is cut off after 1 of 2"));
         assert!(message(b"hello").contains("not an STL file"));
+        for length in TEXT.find("facet").unwrap()..TEXT.find("endsolid").unwrap() {
+            let lines = TEXT[..length].lines().count();
+            let expected = format!("it is cut off in line {lines}: it does not end with");
+            let message = message(&TEXT.as_bytes()[..length]);
+            assert!(message.starts_with(&expected), "{length}: {message}");
+        }
         for (from, to, expected) in [
             ("1e-3", "one", "line 6: `vertex` should have three numbers"),
             ("vertex 1 0 0\n", "", "line 7: a facet has three vertices"),
