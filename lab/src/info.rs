@@ -78,8 +78,6 @@ struct MeshFacts {
     /// The lowest and the highest corner of the box around it.
     bounds: Option<[[f32; 3]; 2]>,
     up: &'static str,
-    /// Triangles with a vertex index out of range: such a mesh cannot be built.
-    triangles_without_vertex: usize,
     triangles_not_finite: usize,
     triangles_without_area: usize,
 }
@@ -174,7 +172,6 @@ impl MeshFacts {
             ("up", self.up.to_owned()),
         ];
         let flaws = [
-            ("without a vertex", self.triangles_without_vertex),
             ("not finite", self.triangles_not_finite),
             ("without area", self.triangles_without_area),
         ];
@@ -189,18 +186,15 @@ impl MeshFacts {
         scene: &Scene,
     ) -> Self {
         let Scene { positions, indices, .. } = scene;
-        let (mut missing, mut not_finite, mut flat) = (0, 0, 0);
+        let (mut not_finite, mut flat) = (0, 0);
         for triangle in indices {
+            // Every format is read without vertices that are not there.
             let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
-            match corners {
-                [Some(a), Some(b), Some(c)] => {
-                    let is_finite = [a, b, c].as_flattened().iter().all(|c| c.is_finite());
-                    let has_area = normal_of(&[a, b, c]).is_some();
-                    not_finite += usize::from(!is_finite);
-                    flat += usize::from(is_finite && !has_area);
-                }
-                _ => missing += 1,
-            }
+            let [Some(a), Some(b), Some(c)] = corners else { continue };
+            let is_finite = [a, b, c].as_flattened().iter().all(|c| c.is_finite());
+            let has_area = normal_of(&[a, b, c]).is_some();
+            not_finite += usize::from(!is_finite);
+            flat += usize::from(is_finite && !has_area);
         }
         Self {
             file: file.to_owned(),
@@ -214,7 +208,6 @@ impl MeshFacts {
                 Up::Y => "y",
                 Up::Z => "z",
             },
-            triangles_without_vertex: missing,
             triangles_not_finite: not_finite,
             triangles_without_area: flat,
         }

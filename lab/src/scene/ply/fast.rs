@@ -9,10 +9,10 @@
 
 use std::io::{self, BufRead, ErrorKind};
 
-use anyhow::{Error, Result, anyhow};
+use anyhow::{Error, Result};
 use ply_rs_bw::ply::{ElementDef, PropertyType, ScalarType};
 
-use super::{cut_off, is_corner_list};
+use super::{cut_off, is_corner_list, no_vertex};
 
 /// The largest record that is decoded here.
 const MAX_BYTES: usize = 512;
@@ -28,6 +28,7 @@ pub(super) struct FaceLayout {
     before: usize,
     behind: usize,
     is_signed: bool,
+    vertex_count: usize,
 }
 
 const fn bytes_of(scalar: &ScalarType) -> usize {
@@ -94,8 +95,8 @@ impl VertexLayout {
 }
 
 impl FaceLayout {
-    /// Returns the layout of an element if this decoder can read its records.
-    pub(super) fn of(element: &ElementDef) -> Option<Self> {
+    /// Returns the layout of an element, whose corners are of so many vertices, if this decoder can read its records.
+    pub(super) fn of(element: &ElementDef, vertex_count: usize) -> Option<Self> {
         let (mut before, mut behind, mut list) = (0, 0, None);
         for (name, property) in &element.properties {
             match &property.data_type {
@@ -111,7 +112,7 @@ impl FaceLayout {
         }
         let PropertyType::List(_, scalar) = list? else { return None };
         let is_signed = matches!(scalar, ScalarType::Int);
-        (before + behind <= MAX_BYTES).then_some(Self { before, behind, is_signed })
+        (before + behind <= MAX_BYTES).then_some(Self { before, behind, is_signed, vertex_count })
     }
 
     /// Reads all faces, as triangle fans around their first corners.
@@ -167,10 +168,19 @@ impl FaceLayout {
         let (words, _) = bytes[..12].as_chunks::<4>();
         let corners = [words[0], words[1], words[2]].map(u32::from_le_bytes);
         let [a, b, c] = corners;
-        if self.is_signed && (a | b | c) >> 31 != 0 {
-            return Err(no_vertex(corners, face));
+        if a.max(b).max(c) as usize >= self.vertex_count {
+            return Err(self.no_vertex(corners, face));
         }
         Ok(corners)
+    }
+
+    /// Returns the error of the first corner of a face that is no vertex.
+    #[cold]
+    fn no_vertex(&self, corners: [u32; 3], face: usize) -> Error {
+        let missing = corners.into_iter().find(|&corner| corner as usize >= self.vertex_count);
+        let missing = missing.unwrap_or_default();
+        let corner = if self.is_signed { missing.cast_signed().into() } else { i64::from(missing) };
+        no_vertex(corner, self.vertex_count).context(format!("`face` element {face}"))
     }
 }
 
@@ -178,11 +188,4 @@ impl FaceLayout {
 fn ended(error: io::Error, done: usize, element: &ElementDef) -> Error {
     let is_end = error.kind() == ErrorKind::UnexpectedEof;
     if is_end { cut_off(done, element) } else { error.into() }
-}
-
-#[cold]
-fn no_vertex(corners: [u32; 3], face: usize) -> Error {
-    let negative = corners.map(u32::cast_signed).into_iter().find(|&corner| corner < 0);
-    anyhow!("vertex {} does not exist", negative.unwrap_or_default())
-        .context(format!("`face` element {face}"))
 }

@@ -45,13 +45,17 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
         let text = error.to_string();
         anyhow!("its header is damaged: {}", text.lines().next().unwrap_or_default())
     })?;
-    ensure!(header.elements.contains_key("vertex"), "its header declares no `vertex` element");
+    let vertices = header.elements.get("vertex").map(|vertex| vertex.count);
+    let vertex_count = vertices.context("its header declares no `vertex` element")?;
     ensure!(
         !header.elements.contains_key("tristrips"),
         "it has triangle strips; convert them to faces first"
     );
 
     let is_little = header.encoding == Encoding::BinaryLittleEndian;
+    // The reader counts the line that it would read next.
+    let line = reader.line().saturating_sub(1);
+    let mut place = Place { encoding: header.encoding, line };
     let mut source = reader.into_inner();
     let mut mesh = Mesh::default();
     for element in header.elements.values() {
@@ -65,7 +69,7 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
                 mesh.positions.reserve_exact(count);
                 match VertexLayout::of(element).filter(|_| is_little) {
                     Some(layout) => layout.read(&mut source, element, &mut mesh.positions)?,
-                    None => each(&mut source, header.encoding, element, |vertex: Vertex| {
+                    None => each(&mut source, &mut place, element, |vertex: Vertex| {
                         mesh.positions.push(vertex.0);
                         Ok(())
                     })?,
@@ -74,31 +78,38 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
             "face" => {
                 check_face(element)?;
                 mesh.indices.reserve_exact(count);
-                match FaceLayout::of(element).filter(|_| is_little) {
+                match FaceLayout::of(element, vertex_count).filter(|_| is_little) {
                     Some(layout) => layout.read(&mut source, element, &mut mesh.indices)?,
-                    None => each(&mut source, header.encoding, element, |face: Face| {
-                        face.fan(&mut mesh.indices)
+                    None => each(&mut source, &mut place, element, |face: Face| {
+                        face.fan(vertex_count, &mut mesh.indices)
                     })?,
                 }
             }
-            _ => each(&mut source, header.encoding, element, |_: Skipped| Ok(()))?,
+            _ => each(&mut source, &mut place, element, |_: Skipped| Ok(()))?,
         }
     }
     Ok(mesh)
 }
 
+/// The part of a file that was read: its encoding, and the lines of text so far.
+struct Place {
+    encoding: Encoding,
+    line: usize,
+}
+
 /// Reads all elements of one kind and hands each to `take`.
 fn each<E: PropertyAccess>(
     source: &mut impl BufRead,
-    encoding: Encoding,
+    place: &mut Place,
     element: &ElementDef,
     mut take: impl FnMut(E) -> Result<()>,
 ) -> Result<()> {
     let parser = Parser::<E>::new();
     let mut line = String::new();
     for number in 0..element.count {
-        let value = match encoding {
+        let value = match place.encoding {
             Encoding::Ascii => {
+                place.line += 1;
                 line.clear();
                 match source.read_line(&mut line) {
                     Ok(0) => return Err(cut_off(number, element)),
@@ -107,7 +118,7 @@ fn each<E: PropertyAccess>(
                 }
             }
             Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian => {
-                let value = match encoding {
+                let value = match place.encoding {
                     Encoding::BinaryLittleEndian => {
                         parser.read_little_endian_element(source, element)
                     }
@@ -121,9 +132,13 @@ fn each<E: PropertyAccess>(
                 value.map_err(Into::into)
             }
         };
-        value
-            .and_then(&mut take)
-            .with_context(|| format!("`{}` element {number}", element.name))?;
+        value.and_then(&mut take).with_context(|| {
+            let element = format!("`{}` element {number}", element.name);
+            match place.encoding {
+                Encoding::Ascii => format!("line {}, {element}", place.line),
+                _ => element,
+            }
+        })?;
     }
     Ok(())
 }
@@ -132,6 +147,11 @@ fn each<E: PropertyAccess>(
 fn cut_off(number: usize, element: &ElementDef) -> Error {
     let (count, name) = (element.count, &element.name);
     anyhow!("it is cut off after {number} of {count} `{name}` elements: fetch or export it again")
+}
+
+/// Returns the error of a corner that is none of so many vertices.
+fn no_vertex(corner: i64, vertex_count: usize) -> Error {
+    anyhow!("there is no vertex {corner}, the file has {vertex_count}, which count from 0")
 }
 
 fn check_vertex(element: &ElementDef) -> Result<()> {
@@ -201,9 +221,10 @@ struct Face(Vec<i32>);
 
 impl Face {
     /// Appends the triangle fan around the first corner; fewer than three corners give no triangle.
-    fn fan(&self, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
+    fn fan(&self, vertex_count: usize, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
         let mut corners = self.0.iter().map(|&corner| {
-            u32::try_from(corner).map_err(|_| anyhow!("vertex {corner} does not exist"))
+            let vertex = u32::try_from(corner).ok().filter(|&it| (it as usize) < vertex_count);
+            vertex.ok_or_else(|| no_vertex(corner.into(), vertex_count))
         });
         let (Some(first), Some(second)) = (corners.next(), corners.next()) else { return Ok(()) };
         let (first, mut previous) = (first?, second?);
@@ -326,8 +347,13 @@ mod tests {
         let mesh = read_all(&file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0]])).unwrap();
         assert_eq!(mesh.positions, VERTICES);
         assert_eq!(mesh.indices, [[0, 1, 2], [1, 3, 0]]);
+        let far = message(&file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0, 4]]));
+        let expected = "`face` element 2: there is no vertex 4, the file has 4, which count from 0";
+        assert_eq!(far, expected);
         let message = message(&file(&[&[0, 1, 2], &[3, 2, -2], &[1, 3, 0]]));
-        assert_eq!(message, "`face` element 1: vertex -2 does not exist");
+        let expected =
+            "`face` element 1: there is no vertex -2, the file has 4, which count from 0";
+        assert_eq!(message, expected);
     }
 
     #[test]
@@ -366,11 +392,24 @@ mod tests {
         assert!(message(b"").contains("not a PLY file"));
         let text = String::from_utf8(ascii()).unwrap();
         let broken = [
-            ("1 0 0 2", "1 zero 0 2", "`vertex` element 1: `zero` is no number that fits here"),
+            (
+                "1 0 0 2",
+                "1 zero 0 2",
+                "line 16, `vertex` element 1: `zero` is no number that fits here",
+            ),
             ("1 0 0 2", "1 0", "`vertex` element 1: the line ends before `z`"),
             ("3 3 2 1 9", "3 3 2.5 1 9", "`face` element 1: `2.5` is no number that fits here"),
             ("3 3 2 1 9", "3 3 2", "`face` element 1: the line ends before `vertex_indices`"),
-            ("3 3 2 1 9", "3 3 -2 1 9", "`face` element 1: vertex -2 does not exist"),
+            (
+                "3 3 2 1 9",
+                "3 3 -2 1 9",
+                "line 21, `face` element 1: there is no vertex -2, the file",
+            ),
+            (
+                "3 3 2 1 9",
+                "3 3 4 1 9",
+                "line 21, `face` element 1: there is no vertex 4, the file has 4",
+            ),
             ("vertex_indices", "corners", "no `vertex_indices`"),
             ("float z", "float w", "no `z`"),
             ("element vertex 4", "element point 4", "no `vertex` element"),
