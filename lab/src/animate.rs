@@ -25,6 +25,7 @@ use crate::cli::AnimateArgs;
 use crate::field::{self, Field, Memory};
 use crate::image;
 use crate::measure::median;
+use crate::notices::tell;
 use crate::plural::{self, counted};
 use crate::progress::Progress;
 use crate::regions::Regions;
@@ -48,6 +49,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let scene = Scene::load(&args.scene)?;
     let name = args.scene.display();
     ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
+    tell(&scene)?;
     if let Some(folder) = &args.output {
         image::make_folder(folder)?;
     }

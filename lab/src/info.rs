@@ -12,9 +12,10 @@ use serde::Serialize;
 use crate::blob::Blob;
 use crate::camera::Up;
 use crate::cli::blob::InfoArgs;
+use crate::notices::tell_hidden;
 use crate::plural::triangles;
 use crate::scene::format::Format;
-use crate::scene::{Scene, read_model};
+use crate::scene::{Scene, is_finite, read_model};
 use crate::shade::normal_of;
 
 /// Prints the facts of a file.
@@ -126,6 +127,7 @@ impl Facts {
         let file = &*file.to_string_lossy();
         if file.starts_with("procedural:") || !path.exists() {
             let scene = Scene::load(path)?;
+            tell_hidden(&scene)?;
             let parts = scene.geometries.len().max(1);
             let format = if parts > 1 { "A+B" } else { "formula" };
             return Ok(Self::Mesh(MeshFacts::of(file, format, [parts; 2], &scene)));
@@ -137,6 +139,7 @@ impl Facts {
         }
         let (format, model) = read_model(path).with_context(cannot)?;
         let counts = [model.meshes.len(), model.instances.len()];
+        let hidden = model.hidden_in(file);
         let mesh =
             model.flatten().context("it has more than 2^32 vertices").with_context(cannot)?;
         let scene = Scene {
@@ -144,8 +147,10 @@ impl Facts {
             positions: mesh.positions,
             indices: mesh.indices,
             is_z_up: format.is_z_up(),
+            hidden,
             ..Scene::default()
         };
+        tell_hidden(&scene)?;
         Ok(Self::Mesh(MeshFacts::of(file, format.name(), counts, &scene)))
     }
 }
@@ -186,15 +191,13 @@ impl MeshFacts {
         scene: &Scene,
     ) -> Self {
         let Scene { positions, indices, .. } = scene;
-        let (mut not_finite, mut flat) = (0, 0);
+        let mut flat = 0;
         for triangle in indices {
             // Every format is read without vertices that are not there.
             let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
             let [Some(a), Some(b), Some(c)] = corners else { continue };
-            let is_finite = [a, b, c].as_flattened().iter().all(|c| c.is_finite());
             let has_area = normal_of(&[a, b, c]).is_some();
-            not_finite += usize::from(!is_finite);
-            flat += usize::from(is_finite && !has_area);
+            flat += usize::from(is_finite(&[a, b, c]) && !has_area);
         }
         Self {
             file: file.to_owned(),
@@ -208,7 +211,7 @@ impl MeshFacts {
                 Up::Y => "y",
                 Up::Z => "z",
             },
-            triangles_not_finite: not_finite,
+            triangles_not_finite: scene.not_finite_count(),
             triangles_without_area: flat,
         }
     }

@@ -13,6 +13,7 @@ use indicatif::HumanCount;
 use crate::blob::Blob;
 use crate::cli::blob::PackArgs;
 use crate::image::{check_sources, check_writable};
+use crate::notices::tell;
 use crate::plural::triangles;
 use crate::regions::Regions;
 use crate::scene::Scene;
@@ -28,6 +29,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
+    tell(&scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
     let blob = pack(&scene, &config, args.density).with_context(cannot)?;

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::cli::{Race, TableArgs};
 use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
+use crate::notices::tell;
 use crate::progress::Progress;
 use crate::render::unseen;
 use crate::scene::Scene;
@@ -75,6 +76,7 @@ impl Results {
         let scenes = scenes.iter().map(|spec| {
             let (scene, spec) = (Scene::load(spec)?, spec.display());
             ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
+            tell(&scene)?;
             let facts = SceneFacts::of(&scene);
             progress.set_scope(&display_name(&facts.scene));
             let methods = measure_diffuse(&scene, &configs, race, &mut progress)

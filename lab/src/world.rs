@@ -185,7 +185,7 @@ mod tests {
         let knot = Shown::load("procedural:knot:800").unwrap();
         let mesh = Mesh { positions: knot.positions, indices: knot.indices };
         let instances = PLACES.map(|place| (0, place)).to_vec();
-        let model = Model { meshes: vec![mesh], instances };
+        let model = Model { meshes: vec![mesh], instances, ..Model::default() };
         assert!(model.is_shared());
         let bounds = model.bounds().unwrap();
         let flat = model.clone().flatten().unwrap();

@@ -325,6 +325,41 @@ fn one_triangle_is_no_plural() {
     }
 }
 
+/// Every command that loads a mesh tells what of it is not shown.
+#[test]
+fn what_is_left_out_is_told() {
+    let folder = Folder::new("left-out").unwrap();
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nf 1 2 3\nf 1 2 4\n";
+    fs::write(folder.0.join("nan.obj"), mesh).unwrap();
+    let gltf = r#"{"asset": {"version": "2.0"}, "cameras": [{"type": "perspective",
+        "perspective": {"yfov": 1, "znear": 1}}]}"#;
+    fs::write(folder.0.join("eye.gltf"), gltf).unwrap();
+    for (command, options) in [
+        ("pack", "-o b.hgrid"),
+        ("table", "--size 9 --repeat 1 --methods bvh"),
+        ("figures", "--size 9 --repeat 1 --methods fixed --densities 4"),
+        ("animate", "--size 9 --frames 1"),
+        ("render", "--size 9"),
+        ("info", ""),
+    ] {
+        let told = |scene: &str| {
+            let output = folder.hgrid(&format!("{command} {scene} {options}")).unwrap();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{command}: {said}");
+            said
+        };
+        // A picture tells it with its numbers, and a description has a row.
+        let expected = match command {
+            "render" | "info" => "",
+            _ => "nan.obj: one triangle that is not finite is left out\n",
+        };
+        let said = told("nan.obj");
+        assert!(said.starts_with(expected) && (said.is_empty() == expected.is_empty()), "{said}");
+        let said = told("a.obj+eye.gltf");
+        assert_eq!(said.matches("eye.gltf: not shown: 1 camera\n").count(), 1, "{command}: {said}");
+    }
+}
+
 #[test]
 fn a_blob_can_be_an_array_of_c() {
     let folder = Folder::new("c").unwrap();

@@ -21,6 +21,7 @@ use crate::cli::Picture;
 use crate::field::Field;
 use crate::machine::Machine;
 use crate::measure::{SceneFacts, ratio};
+use crate::notices::tell;
 use crate::progress::Progress;
 use crate::render::unseen;
 use crate::scene::Scene;
@@ -237,6 +238,7 @@ impl SceneNumbers {
     ) -> Result<Self> {
         let mut scene = Scene::load(spec)?;
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
+        tell(&scene)?;
         let bounds = scene.whole_bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
         let shown = plan.shown;

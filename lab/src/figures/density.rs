@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::cli::FiguresArgs;
 use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, rows};
+use crate::notices::tell;
 use crate::plot::{
     Area, AreaResult, COLORS, Drawing, HEADING, INK, MUTED, Pen, Scale, Stops, WORDS, Words, chart,
     heading, number,
@@ -49,6 +50,10 @@ impl Curves {
         };
         let (scene, spec) = (Scene::load(spec)?, spec.display());
         ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
+        // Figure 2 tells of its own scenes.
+        if args.figure1.is_some() {
+            tell(&scene)?;
+        }
         let facts = SceneFacts::of(&scene);
 
         let race = &args.race;

@@ -61,7 +61,7 @@ fn build_instances<T>(
     threads: &Threads,
     then: impl FnOnce(World<'_>, Built) -> Result<T>,
 ) -> Result<T> {
-    let Model { meshes, instances } = model;
+    let Model { meshes, instances, .. } = model;
     let has_triangles = |mesh: usize| meshes.get(mesh).is_some_and(|mesh| !mesh.indices.is_empty());
     let placed = instances.iter().filter(|(mesh, _)| has_triangles(*mesh));
     let placed = placed

@@ -28,6 +28,7 @@ use crate::heat::{self, Counter, Picture};
 use crate::image;
 use crate::light::Lights;
 use crate::measure::{self, SceneFacts, ratio};
+use crate::notices::tell_hidden;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::model::Model;
@@ -49,6 +50,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let start = Instant::now();
     let (scene, model) = Scene::open(&args.scene, args.takes_instances())?;
     let load_seconds = start.elapsed().as_secs_f64();
+    tell_hidden(&scene)?;
     // Only now, because a file that is no mesh has an error of its own.
     image::check_sources(&args.output, &args.scene, "picture")?;
     let facts = match &model {

@@ -6,6 +6,7 @@ use indicatif::HumanCount;
 use serde::Serialize;
 
 use crate::measure::{SceneFacts, ratio};
+use crate::notices::left_out;
 use crate::plural::{counted, triangles};
 
 /// A picture, and the time and work that it took.
@@ -84,10 +85,9 @@ impl fmt::Display for Summary {
         let each = ratio(self.index_bytes as u64, scene.triangles as u64);
         let built = seconds(self.build_seconds);
         write!(f, "{method}: built in {built}, {bytes} bytes, {each:.1} a triangle")?;
-        match self.skipped_triangles {
-            0 => writeln!(f)?,
-            1 => writeln!(f, "; one triangle that is not finite is left out")?,
-            skipped => writeln!(f, "; {skipped} triangles that are not finite are left out")?,
+        match left_out(self.skipped_triangles) {
+            None => writeln!(f)?,
+            Some(left_out) => writeln!(f, "; {left_out}")?,
         }
 
         write!(f, "picture: {size} x {size} pixels")?;

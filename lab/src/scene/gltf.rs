@@ -1,7 +1,10 @@
 //! glTF files, as JSON or binary (GLB): the triangles of the default scene's meshes, placed by its nodes.
 //!
 //! A primitive is a mesh here, because it has its own vertices; a node with a glTF mesh is an instance of
-//! each of its primitives. Materials, skins, morph targets and animations are ignored: the scene is at rest.
+//! each of its primitives. Materials and lights are ignored. So are skins, morph targets, animations and cameras, of
+//! which the model tells: the scene is at rest.
+
+mod accessor;
 
 use core::ops::Range;
 use std::fs;
@@ -9,13 +12,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use base64::Engine as _;
-use gltf::accessor::{DataType, Dimensions, Item, Iter};
-use gltf::buffer::{Source, View};
+use gltf::accessor::{DataType, Dimensions};
+use gltf::buffer::Source;
 use gltf::mesh::Mode;
-use gltf::{Accessor, Document, Gltf, Primitive, Semantic};
+use gltf::{Document, Gltf, Primitive, Semantic};
 
+use self::accessor::{check_sparse, is_inside, positions};
 use super::format::Format;
 use super::model::{IDENTITY, Mesh, Model, Transform};
+use crate::plural::counted;
 use crate::vector::round;
 
 /// A matrix in `f64`, so that the product of a chain of nodes is rounded once.
@@ -55,6 +60,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
         places.push(first..model.meshes.len());
     }
     model.instances = instances(&document, &places)?;
+    model.hidden = hidden(&document);
     Ok(model)
 }
 
@@ -74,6 +80,30 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
+/// Returns the words for what changes shapes or shows them, and is not read.
+fn hidden(document: &Document) -> Vec<String> {
+    let has_targets =
+        |mesh: &gltf::Mesh<'_>| mesh.primitives().any(|part| part.morph_targets().len() > 0);
+    let targets = document.meshes().filter(has_targets).count();
+    [
+        (document.animations().len(), "animation", "animations"),
+        (document.skins().len(), "skin", "skins"),
+        (targets, "mesh with morph targets", "meshes with morph targets"),
+        (document.cameras().len(), "camera", "cameras"),
+    ]
+    .into_iter()
+    .filter(|&(count, ..)| count > 0)
+    .map(|(count, one, many)| counted(count, one, many))
+    .collect()
+}
+
+/// Refuses other versions of glTF than 2, whose files have the same names.
+fn check_version(version: &str) -> Result<()> {
+    let is_read = version == "2" || version.starts_with("2.");
+    ensure!(is_read, "it is of glTF {version}, and hgrid reads glTF 2: export it as that");
+    Ok(())
+}
+
 /// Parses and checks a file. [`QUANTIZED`] and extensions that change how surfaces look are allowed even if the file
 /// requires them.
 fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
@@ -85,8 +115,17 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
         ensure!(is_whole, "it is cut off: it has {there} bytes of {needed}");
         ensure!(needed >= 12, "{cannot}: its header takes more than its {needed} bytes");
     }
-    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).context(cannot)?;
+    let parsed = Gltf::from_slice_without_validation(bytes);
+    // Files of glTF 1 are objects where those of glTF 2 are arrays.
+    if parsed.is_err()
+        && let Ok(json) = serde_json::from_slice::<serde_json::Value>(bytes)
+        && let Some(version) = json["asset"]["version"].as_str()
+    {
+        check_version(version)?;
+    }
+    let Gltf { document, blob } = parsed.context(cannot)?;
     let mut root = document.into_json();
+    check_version(root.asset.min_version.as_ref().unwrap_or(&root.asset.version))?;
     let is_read =
         |name: &String| name == QUANTIZED || LOOKS.iter().any(|start| name.starts_with(start));
     root.extensions_required.retain(|name| !is_read(name));
@@ -151,6 +190,7 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
     }
     ensure!(accessor.dimensions() == Dimensions::Vec3, "its positions are not three numbers each");
     ensure!(is_inside(&accessor, buffers), "its positions are outside their buffer");
+    check_sparse(&accessor, buffers)?;
     let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|bytes| &**bytes));
     let positions = positions(&accessor, buffers)?;
     let corners: Vec<u32> = match primitive.indices() {
@@ -164,6 +204,7 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
             ensure!(indices.count() > 0, "it has no indices");
             let outside = "its indices are outside their buffer";
             ensure!(is_inside(&indices, buffers), outside);
+            check_sparse(&indices, buffers)?;
             reader.read_indices().context(outside)?.into_u32().collect()
         }
     };
@@ -185,63 +226,6 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
         _ => corners.as_chunks::<3>().0.to_vec(),
     };
     Ok(Some(Mesh { positions, indices }))
-}
-
-/// Returns true if all elements of an accessor lie in their buffers, none in the next one. The crate panics where they
-/// overlap or their places overflow, and reserves memory for as many as a sparse accessor claims.
-fn is_inside(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> bool {
-    let holds = |view: View<'_>, offset: usize, count: usize, size: usize| {
-        let stride = view.stride().unwrap_or(size);
-        let last =
-            count.checked_sub(1).and_then(|last| last.checked_mul(stride)?.checked_add(offset));
-        let end = last.and_then(|last| last.checked_add(size)).filter(|&end| end <= view.length());
-        let end_of_view = view.offset().checked_add(view.length());
-        let bytes = buffers.get(view.buffer().index()).map_or(0, Vec::len);
-        stride >= size && end.is_some() && end_of_view.is_some_and(|end| end <= bytes)
-    };
-    let (count, size) = (accessor.count(), accessor.size());
-    let are_own = match accessor.view() {
-        Some(view) => holds(view, accessor.offset(), count, size),
-        // Zeros, but for those that a sparse accessor names.
-        None => count <= buffers.iter().map(Vec::len).sum(),
-    };
-    are_own
-        && accessor.sparse().is_none_or(|sparse| {
-            let (indices, values, count) = (sparse.indices(), sparse.values(), sparse.count());
-            holds(indices.view(), indices.offset(), count, indices.index_type().size())
-                && holds(values.view(), values.offset(), count, size)
-        })
-}
-
-/// Reads positions: floats or, as `KHR_mesh_quantization` has them, small whole numbers, which stand for parts of the
-/// largest one if they are normalized.
-fn positions(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<Vec<[f32; 3]>> {
-    let largest = |most: f32| if accessor.normalized() { most } else { 1.0 };
-    let positions = match accessor.data_type() {
-        DataType::F32 => numbers::<f32>(accessor, buffers, 1.0),
-        DataType::I8 => numbers::<i8>(accessor, buffers, largest(127.0)),
-        DataType::U8 => numbers::<u8>(accessor, buffers, largest(255.0)),
-        DataType::I16 => numbers::<i16>(accessor, buffers, largest(32_767.0)),
-        DataType::U16 => numbers::<u16>(accessor, buffers, largest(65_535.0)),
-        DataType::U32 => bail!("its positions are neither floats nor of 8 or 16 bits"),
-    };
-    positions.context("its positions are outside their buffer")
-}
-
-/// Reads positions of one type as parts of the largest number. The least one of a signed type would be less than -1,
-/// and means -1.
-fn numbers<T: Item + Copy + Into<f32>>(
-    accessor: &Accessor<'_>,
-    buffers: &[Vec<u8>],
-    largest: f32,
-) -> Option<Vec<[f32; 3]>> {
-    let bytes = |buffer: gltf::Buffer<'_>| buffers.get(buffer.index()).map(|bytes| &**bytes);
-    let points = Iter::<[T; 3]>::new(accessor.clone(), bytes)?;
-    let part = |number: T| {
-        let part = number.into() / largest;
-        if largest > 1.0 { part.max(-1.0) } else { part }
-    };
-    Some(points.map(|point| point.map(part)).collect())
 }
 
 /// Walks the nodes of the default scene, or of the first one; without scenes, all nodes.
@@ -410,6 +394,9 @@ mod tests {
         let read = corners(file(base, "4", 1).unwrap());
         assert_eq!(read, [[0., 0., 0.], [1., 0., 0.], [1., 0., 0.], [1., 1., 0.]]);
         assert_eq!(corners(file("", "3", 1).unwrap()), [[0.; 3], [0.; 3], [1., 0., 0.]]);
+        // The index of the replaced vertex is 2.
+        let message = format!("{:#}", file("", "2", 1).unwrap_err());
+        assert!(message.ends_with("sparse accessor replaces element 2, and it has 2"), "{message}");
         for (view, vertices, count) in [
             (base, "4", 0),
             (base, "4", 2),
@@ -428,6 +415,20 @@ mod tests {
         let texture = r#""textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}], "#;
         let text = as_text().replacen(r#""asset""#, &[texture, names].concat(), 1);
         assert_eq!(read_text(&text).unwrap(), read_text(&as_text()).unwrap());
+    }
+
+    #[test]
+    fn what_is_not_shown_is_told() {
+        let target = r#""targets": [{"POSITION": 0}], "attributes""#;
+        let text = as_text().replacen(r#""attributes""#, target, 1);
+        let more = r#""animations": [{"channels": [], "samplers": []}, {"channels": [], "samplers": []}],
+            "skins": [{"joints": [0]}],
+            "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}], "asset""#;
+        let model = read_text(&text.replacen(r#""asset""#, more, 1)).unwrap();
+        let expected =
+            "a.glb: not shown: 2 animations, 1 skin, 1 mesh with morph targets, 1 camera";
+        assert_eq!(model.hidden_in("a.glb"), [expected]);
+        assert!(read_text(&as_text()).unwrap().hidden_in("a.glb").is_empty());
     }
 
     #[test]
@@ -516,6 +517,13 @@ mod tests {
                 "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
             (r#""mesh": 0"#, r#""mesh": 8"#, "not a valid glTF file"),
+            (
+                r#""2.0""#,
+                r#""1.0""#,
+                "it is of glTF 1.0, and hgrid reads glTF 2: export it as that",
+            ),
+            (r#""2.0""#, r#""2.0", "minVersion": "3.0""#, "it is of glTF 3.0"),
+            (r#""2.0"}, "scene": 0"#, r#""1.0"}, "scene": "a""#, "it is of glTF 1.0"),
             (r#""POSITION": 0"#, r#""POSITION": 2"#, "a mesh names an accessor that is not there"),
             ("{", "[", "not a valid glTF file"),
         ] {

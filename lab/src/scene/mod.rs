@@ -19,7 +19,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
-use hgrid_core::{Error, MeshPart, TriangleMesh};
+use hgrid_core::{Error, MAX_COORDINATE, MeshPart, Triangle, TriangleMesh};
 
 use self::format::{ENDINGS, Format};
 use self::model::{Mesh, Model};
@@ -44,6 +44,8 @@ pub struct Scene {
     pub of_triangles: Option<Bounds>,
     /// The axis that the file's format says is up, if it does: true for z, false for y.
     pub is_z_up: Option<bool>,
+    /// A sentence for each file that has more than is read of it.
+    pub hidden: Vec<String>,
 }
 
 impl Scene {
@@ -89,7 +91,8 @@ impl Scene {
         }
         let (format, model) = read_model(path).with_context(|| format!("cannot load `{spec}`"))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let scene = Self { name, is_z_up: format.is_z_up(), ..Self::default() };
+        let hidden = model.hidden_in(&spec);
+        let scene = Self { name, is_z_up: format.is_z_up(), hidden, ..Self::default() };
         if takes_instances && model.is_shared() {
             let positions = model.bounds().map_or_else(Vec::new, |(min, max)| vec![min, max]);
             return Ok((Self { positions, ..scene }, Some(model)));
@@ -130,7 +133,8 @@ impl Scene {
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
         let indices = inside.chain(behind).collect();
         let is_z_up = self.is_z_up;
-        Self { name, positions, indices, geometries, focus, of_triangles: None, is_z_up }
+        let hidden = [self.hidden, outer.hidden].concat();
+        Self { name, positions, indices, geometries, focus, of_triangles: None, is_z_up, hidden }
     }
 
     /// Returns the first triangle of each geometry, or 0 for a scene of one.
@@ -163,6 +167,16 @@ impl Scene {
         TriangleMesh::join(parts)
     }
 
+    /// Returns the number of triangles that are not finite, which every build leaves out.
+    #[must_use]
+    pub fn not_finite_count(&self) -> usize {
+        let corners = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions.get(vertex as usize).copied());
+            Some([a?, b?, c?])
+        };
+        self.indices.iter().filter_map(corners).filter(|triangle| !is_finite(triangle)).count()
+    }
+
     /// Returns the box around all finite vertices, or `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
@@ -181,6 +195,11 @@ impl Scene {
     pub fn framed_bounds(&self) -> Bounds {
         self.focus.or_else(|| self.whole_bounds()).unwrap_or_default()
     }
+}
+
+/// Returns true if the core takes a triangle as finite.
+pub(crate) fn is_finite(triangle: &Triangle) -> bool {
+    triangle.as_flattened().iter().all(|c| c.abs() <= MAX_COORDINATE)
 }
 
 /// Reads the meshes of a file and their instances, in the file's format.

@@ -7,6 +7,8 @@
 //!
 //! A file without transforms is one mesh with one instance, whose transform is the identity.
 
+use core::fmt;
+
 use hgrid_core::{Block, Config, Instance, Object, Scene as Instances};
 
 use super::Bounds;
@@ -64,15 +66,23 @@ pub struct Model {
     pub meshes: Vec<Mesh>,
     /// The index of a mesh, and its transform.
     pub instances: Vec<(usize, Transform)>,
+    /// What else the file has that is not read, in words.
+    pub hidden: Vec<String>,
 }
 
 impl From<Mesh> for Model {
     fn from(mesh: Mesh) -> Self {
-        Self { meshes: vec![mesh], instances: vec![(0, IDENTITY)] }
+        Self { meshes: vec![mesh], instances: vec![(0, IDENTITY)], hidden: Vec::new() }
     }
 }
 
 impl Model {
+    /// Returns a sentence about what a file has that is not read; nothing if there is none.
+    pub(crate) fn hidden_in(&self, file: impl fmt::Display) -> Vec<String> {
+        let hidden = self.hidden.join(", ");
+        if hidden.is_empty() { Vec::new() } else { vec![format!("{file}: not shown: {hidden}")] }
+    }
+
     /// Returns true if a mesh with triangles has more than one instance, and a scene can take all of them: no
     /// transform is flat, or so nearly that it has no inverse in f32.
     #[must_use]
@@ -189,8 +199,11 @@ mod tests {
         assert_eq!(Model::from(mesh.clone()).flatten().as_ref(), Some(&mesh));
         let moved = [[2.0, 0.0, 0.0, 5.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, -1.0]];
         let mirror = [[-1.0, 0.0, 0.0, 0.0], IDENTITY[1], IDENTITY[2]];
-        let model =
-            Model { meshes: vec![mesh], instances: vec![(0, moved), (0, mirror), (7, mirror)] };
+        let model = Model {
+            meshes: vec![mesh],
+            instances: vec![(0, moved), (0, mirror), (7, mirror)],
+            ..Model::default()
+        };
         let all = model.flatten().unwrap();
         assert_eq!(all.indices, [[0, 1, 2], [3, 5, 4]]);
         let bits = |positions: &[[f32; 3]]| {
@@ -215,6 +228,7 @@ mod tests {
         let of = |instances: &[(usize, Transform)]| Model {
             meshes: vec![mesh.clone(), mesh.clone(), Mesh::default()],
             instances: instances.to_vec(),
+            ..Model::default()
         };
         let beside = [[1.0, 0.0, 0.0, 5.0], IDENTITY[1], [0.0, 0.0, -1.0, 2.0]];
         let flat = [IDENTITY[0], IDENTITY[1], [0.0; 4]];
@@ -251,7 +265,9 @@ mod tests {
         let mesh = |indices| Mesh { positions: vec![[0.0; 3]], indices };
         let meshes = vec![mesh(vec![[0, 0, 1]]), mesh(vec![[0; 3]])];
         let all =
-            Model { meshes, instances: vec![(0, IDENTITY), (1, IDENTITY)] }.flatten().unwrap();
+            Model { meshes, instances: vec![(0, IDENTITY), (1, IDENTITY)], ..Model::default() }
+                .flatten()
+                .unwrap();
         assert_eq!(all.indices, [[0, 0, u32::MAX], [1; 3]]);
     }
 }
