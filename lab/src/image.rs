@@ -62,6 +62,9 @@ fn refusal(path: &Path) -> Option<String> {
     if path.is_dir() {
         return Some("it is a folder: name a file in it".to_owned());
     }
+    if path.is_symlink() && !path.exists() {
+        return Some("it is a link to a file that is not there: name that file".to_owned());
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty())?;
     let name = folder.display();
     // A folder that cannot be looked into may be there.
@@ -136,11 +139,15 @@ mod tests {
         check_writable(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"before");
         write_png(&path, (1, 1), &[[0; 3]]).unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink("nowhere.png", folder.join("link.png")).unwrap();
         for (name, expected) in [
             ("", "`: it is a folder: name a file in it"),
             ("missing/picture.png", "missing`: make it, or name another one"),
             ("picture.png/other.png", "picture.png` is a file: name a folder in its place"),
             ("other.png/", "`: its name ends like that of a folder: name a file"),
+            #[cfg(unix)]
+            ("link.png", "`: it is a link to a file that is not there: name that file"),
         ] {
             let message = format!("{:#}", check_writable(&folder.join(name)).unwrap_err());
             assert!(message.starts_with("cannot write `"), "{message}");
