@@ -75,20 +75,12 @@ impl Cli {
             return parse(&words);
         }
         let first = words.first().map(|word| word.to_string_lossy().into_owned());
-        let first = first.filter(|word| is_bare(word) && !Path::new(word).exists());
-        let nearest = first.as_ref().and_then(|_| nearest_command(&parse(&words).err()?));
-        words.insert(0, "render".into());
-        let parsed = parse(&words);
-        let is_refused =
-            || parsed.as_ref().is_err_and(|error| error.kind() == ErrorKind::UnknownArgument);
-        match first {
-            Some(word) if nearest.is_some() || is_refused() => {
-                let hint = nearest.map(|name| format!("; the nearest command is `{name}`"));
-                let message = format!("no command or file `{word}`{}", hint.unwrap_or_default());
-                Err(Self::command().error(ErrorKind::InvalidSubcommand, message))
-            }
-            _ => parsed,
+        if let Some(word) = first.filter(|word| is_bare(word) && !Path::new(word).exists()) {
+            let nearest = parse(&words).err().and_then(|error| nearest_command(&error));
+            return Err(no_command(&word, nearest));
         }
+        words.insert(0, "render".into());
+        parse(&words)
     }
 
     /// Refuses options that have no effect or contradict each other.
@@ -129,6 +121,22 @@ fn with_two_scenes(mut error: clap::Error, words: &[OsString]) -> clap::Error {
 /// Returns true if a word may be meant as a command: it is no option, and has nothing that names of scenes have.
 fn is_bare(word: &str) -> bool {
     word.chars().all(|c| c.is_ascii_alphabetic() || c == '-') && !word.starts_with('-')
+}
+
+/// Returns the error of a word that is neither a command nor a file, with the commands.
+fn no_command(word: &str, nearest: Option<String>) -> clap::Error {
+    let mut cli = Cli::command();
+    // Words that have little in common are told to be near, too.
+    let nearest = nearest.filter(|name| name.chars().next() == word.chars().next());
+    let hint = nearest.map(|name| format!(", the nearest command is `{name}`"));
+    let shown = cli.get_subcommands().filter(|command| !command.is_hide_set());
+    let names: Vec<_> = shown.map(|command| command.get_name().to_owned()).collect();
+    let message = format!(
+        "no command or file `{word}`{}; the commands are {}",
+        hint.unwrap_or_default(),
+        names.join(", ")
+    );
+    cli.error(ErrorKind::InvalidSubcommand, message)
 }
 
 /// The command that is spelt nearly as the one that an error is about.
@@ -281,6 +289,7 @@ impl AnimateArgs {
             !self.refit || self.frames > 1,
             "--refit is for later frames than the first: ask for --frames 2 or more, or leave out --refit"
         );
+        self.picture.check()?;
         self.tuning.check("--method", &[self.method])
     }
 }
@@ -335,6 +344,7 @@ impl CompareArgs {
     /// # Errors
     /// If there is one; the message names the option and its method.
     pub fn check(&self) -> anyhow::Result<()> {
+        self.picture.check()?;
         let has_tree = self.methods.is_empty() || self.methods.contains(&Method::Bvh);
         ensure!(
             self.quality.is_none() || has_tree,
@@ -430,6 +440,7 @@ impl Race {
             self.builders.threads == 1 || methods.contains(&Method::Bvh),
             "--threads is for --methods bvh: ask for that, or leave out --threads"
         );
+        self.picture.check()?;
         self.tuning.check("--methods", &methods)
     }
 

@@ -130,7 +130,8 @@ fn a_file_alone_is_rendered() {
 
     assert!(folder.fails("a.obj -o a.jpg").unwrap().contains("name it a.png"));
     assert!(folder.fails("nothing.ply").unwrap().contains("cannot open it"));
-    assert!(folder.fails("nothing").unwrap().contains("no scene `nothing`"));
+    assert!(folder.fails("nothing").unwrap().contains("no command or file `nothing`"));
+    assert!(folder.fails("render nothing").unwrap().contains("no scene `nothing`"));
     assert!(folder.fails("rendr a.obj").unwrap().contains("the nearest command is `render`"));
     assert!(folder.fails("report nope").unwrap().contains("`nope` is no checkout of hgrid"));
     fs::write(folder.0.join("empty.ply"), "").unwrap();

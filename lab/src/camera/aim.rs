@@ -2,7 +2,7 @@
 
 use core::str::FromStr;
 
-use anyhow::{Error, Result};
+use anyhow::{Error, Result, anyhow};
 
 use super::{Camera, Lens, Up, View, named};
 use crate::scene::Scene;
@@ -35,7 +35,9 @@ impl FromStr for Aim {
     fn from_str(word: &str) -> Result<Self> {
         match named::name(word) {
             Some(name) => Ok(Self::Named(name)),
-            None => word.parse().map(Self::Side),
+            None => word.parse().map(Self::Side).map_err(|error| {
+                anyhow!("{error}; some scenes have named views, too, which --help lists")
+            }),
         }
     }
 }

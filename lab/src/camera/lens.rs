@@ -29,8 +29,11 @@ impl FromStr for Lens {
 
     #[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
     fn from_str(word: &str) -> Result<Self> {
-        let degrees: f64 = word.parse()?;
-        ensure!((1.0..=120.0).contains(&degrees), "a field of view is from 1 to 120 degrees");
+        let degrees: f64 = word.parse().unwrap_or(f64::NAN);
+        ensure!(
+            (1.0..=120.0).contains(&degrees),
+            "a field of view is a number of degrees from 1 to 120"
+        );
         Ok(Self { half_view_tangent: (0.5 * degrees).to_radians().tan() as f32 })
     }
 }

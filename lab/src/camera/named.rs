@@ -2,6 +2,7 @@
 
 use anyhow::{Context as _, Result};
 
+use super::view::SIDES;
 use super::{Camera, Lens, Point, Up, View};
 use crate::scene::Scene;
 
@@ -56,9 +57,8 @@ pub(super) fn name(word: &str) -> Option<&'static str> {
 pub(super) fn camera(scene: &Scene, name: &str, up: Up, lens: Lens) -> Result<Camera> {
     let views = || VIEWS.iter().filter(|view| view.scene == scene.name);
     let view = views().find(|view| view.name == name).with_context(|| {
-        let names: Vec<_> = views().map(|view| view.name).collect();
-        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        format!("`{}` has no view `{name}`; its named views: {names}", scene.name)
+        let names: Vec<_> = views().map(|view| view.name).chain([SIDES]).collect();
+        format!("`{}` has no view `{name}`; its views are {}", scene.name, names.join(", "))
     })?;
     Ok(match view.place {
         Place::Around(view) => Camera::framing_through(lens, scene.framed_bounds(), view, up),
@@ -99,7 +99,10 @@ mod tests {
         let eye = camera(&scene("sponza.ply"), "inside", Up::Y, lens).unwrap().ray(0, 0, 1);
         assert_eq!((eye.origin, eye.direction), ([0.0, 3.0, 0.0], [1.0, 0.0, 0.0]));
         let error = camera(&scene("bunny.ply"), "inside", Up::Y, lens).unwrap_err().to_string();
-        assert!(error.contains("`bunny.ply`") && error.contains("close"), "{error}");
+        assert!(
+            error.contains("`bunny.ply`") && error.contains("are close, front, back"),
+            "{error}"
+        );
         assert!(name("nowhere").is_none());
     }
 }

@@ -2,11 +2,15 @@
 
 use core::str::FromStr;
 
-use anyhow::{Context as _, Error, Result, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, ensure};
 use clap::ValueEnum;
 
 use crate::scene::{Bounds, Scene};
 use crate::vector::{Vector, round, unit};
+
+/// The views of any scene.
+pub(super) const SIDES: &str =
+    "front, back, left, right, top, bottom, three-quarter or AZIMUTH,ELEVATION in degrees";
 
 /// A box lower than this part of its width is flat.
 const FLAT: f64 = 0.25;
@@ -131,10 +135,8 @@ impl FromStr for View {
             "bottom" => Self::Bottom,
             "three-quarter" => Self::ThreeQuarter,
             _ => {
-                let [azimuth, elevation] = numbers(word).context(
-                    "a view is front, back, left, right, top, bottom, three-quarter \
-                     or AZIMUTH,ELEVATION in degrees",
-                )?;
+                let angles = numbers(word);
+                let [azimuth, elevation] = angles.map_err(|_| anyhow!("a view is {SIDES}"))?;
                 ensure!(elevation.abs() <= 90.0, "ELEVATION is from -90 to 90 degrees");
                 Self::Angles { azimuth, elevation }
             }
@@ -158,7 +160,8 @@ impl FromStr for Point {
     type Err = Error;
 
     fn from_str(word: &str) -> Result<Self> {
-        numbers(word).map(Self).context("a point is X,Y,Z")
+        let point = numbers(word).map(Self);
+        point.map_err(|_| anyhow!("a point is three finite numbers between commas, like 0,3,-1.5"))
     }
 }
 

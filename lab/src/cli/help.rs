@@ -112,7 +112,8 @@ Scenes:
   procedural:knot[:TRIANGLES]     a closed, finely bumped surface, like a scan
   procedural:stage[:TRIANGLES]    the same on a floor eighty times its size
   procedural:soup[:TRIANGLES]     a cube full of small triangles
-  A+B                             A in the middle of B, each in its colour: bunny.ply+stadium.ply
+  A+B                             A in the middle of B, each in its colour: bunny.ply+stadium.ply;
+                                  both keep their axes, and without --up that of A is up
   TRIANGLES is a number like 5000, 20K or 3M, up to 100M";
 
 const VIEWS: &str = "\

@@ -34,6 +34,18 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Refuses a camera without a direction.
+    ///
+    /// # Errors
+    /// If it has none.
+    pub fn check(&self) -> Result<()> {
+        ensure!(
+            self.eye.is_none() || self.eye != self.target,
+            "--eye and --target are the same point: there is no direction to look in"
+        );
+        Ok(())
+    }
+
     /// Returns the picture of a scene for measurements; by default it shows all of the scene.
     ///
     /// # Errors
@@ -70,7 +82,7 @@ impl Picture {
             let target = self.target.unwrap_or(Point::centre_of(scene.framed_bounds()));
             ensure!(
                 eye != target,
-                "--eye and --target are the same point: there is no direction to look in"
+                "--eye is in the middle of the scene, to which it looks: add --target X,Y,Z"
             );
             return Ok(Some(Camera::between(eye, target, up, lens)));
         }

@@ -87,6 +87,7 @@ impl RenderArgs {
             "--density is not for {}, which has none: name another --method, or leave it out",
             self.method.name()
         );
+        self.picture.check()?;
         self.tuning.check("--method", &[self.method])?;
         let is_for = |option: &str, is_there: bool, shading: Shading, word: &str| {
             ensure!(

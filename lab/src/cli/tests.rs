@@ -142,11 +142,16 @@ fn a_misspelt_command_is_no_file() {
     };
     for words in ["rendr one.obj", "rendr", "rendr --json"] {
         let said = message(words);
-        let expected = "no command or file `rendr`; the nearest command is `render`";
+        let expected =
+            "no command or file `rendr`, the nearest command is `render`; the commands are";
         assert!(said.contains(expected), "{said}");
     }
-    let said = message("xyz one.obj");
-    assert!(said.contains("no command or file `xyz`\n"), "{said}");
+    for words in ["xyz one.obj", "xyz", "xyz --help", "frobnicate"] {
+        let said = message(words);
+        let word = words.split(' ').next().unwrap();
+        let expected = format!("no command or file `{word}`; the commands are render, info, pack,");
+        assert!(said.contains(&expected) && !said.contains("first-build"), "{said}");
+    }
     let said = message("a.ply b.ply");
     assert!(said.contains("unexpected argument 'b.ply'"), "{said}");
     assert!(said.contains("one scene: `a.ply+b.ply` shows both"), "{said}");
@@ -215,6 +220,15 @@ fn parameters_of_others_are_refused() {
 fn options_without_effect_are_refused_with_the_words() {
     for (words, expected) in [
         ("a.ply --density 8", "--density is not for bvh"),
+        ("a.ply --eye nan,0,0", "three finite numbers between commas"),
+        ("a.ply --eye 1,2", "three finite numbers between commas"),
+        ("a.ply --fov wide", "a number of degrees from 1 to 120"),
+        ("a.ply --view above", "three-quarter or AZIMUTH,ELEVATION in degrees; some scenes have"),
+        ("a.ply --target 1,2,3", "--eye <X,Y,Z>"),
+        ("a.ply --eye 1,2,3 --target 1,2,3", "the same point"),
+        ("table a.ply --eye 1,2,3 --target 1,2,3", "the same point"),
+        ("animate a.ply --eye 1,2,3 --target 1,2,3", "the same point"),
+        ("compare a.ply --eye 1,2,3 --target 1,2,3", "the same point"),
         ("a.ply --samples 4 --shading heat", "--samples is not for --shading heat"),
         ("pack a.ply -o a.hgrid --density 8", "--density is not for bvh"),
         ("pack a.ply -o a.c", "add --c-array NAME"),

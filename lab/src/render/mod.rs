@@ -295,7 +295,7 @@ mod tests {
         let not_finite = "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n";
         let huge = "v 0 0 0\nv 3e38 0 0\nv 0 3e38 0\nf 1 2 3\n";
         let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\nf 4 4 4\n";
-        let cases: [(&str, &str, &str); 20] = [
+        let cases: [(&str, &str, &str); 22] = [
             ("--method fixed --density -1", TRIANGLE, "density"),
             ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),
             ("--no-shadows --shading heat", TRIANGLE, "--no-shadows is for --shading diffuse"),
@@ -309,6 +309,8 @@ mod tests {
             ("--method recursive --depth 5", TRIANGLE, "5 is not in 1..=4"),
             ("--method fixed --quality high", TRIANGLE, "--quality is for --method bvh"),
             ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
+            ("--eye 0.5,0.5,0", TRIANGLE, "--eye is in the middle of the scene, to which it looks"),
+            ("--view close", TRIANGLE, "has no view `close`; its views are front, back, left"),
             ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything; look from elsewhere"),
             ("--json", flat, "no triangle has finite corners and an area"),
             ("--json", not_finite, "no triangle has finite corners and an area"),
