@@ -2,11 +2,12 @@
 //!
 //! The bar appears on standard error after a second, only if that is a terminal, and disappears when the work
 //! is done. Standard output belongs to the results, and a bar that flashes by is of no use. Generating,
-//! loading and measuring share it.
+//! loading and measuring share it. If standard error is a file or a pipe, each step after that second gets a line
+//! in place of the bar.
 
 use core::fmt;
 use core::time::Duration;
-use std::io::{self, Read};
+use std::io::{self, IsTerminal as _, Read, Write as _};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -44,7 +45,17 @@ impl Progress {
 
     /// Sets the message: the present piece of work.
     pub fn set_message(&self, what: &str) {
-        self.bar.set_message(format!("{}{what}", self.scope));
+        let message = format!("{}{what}", self.scope);
+        if self.has_line(io::stderr().is_terminal()) {
+            // Not `eprintln`, which panics if nothing can be written.
+            let _ = writeln!(io::stderr(), "{message}");
+        }
+        self.bar.set_message(message);
+    }
+
+    /// Returns true if the step that begins gets a line.
+    fn has_line(&self, is_terminal: bool) -> bool {
+        !is_terminal && self.bar.elapsed() > PATIENCE
     }
 
     /// Sets the words that come before all further messages.
@@ -80,5 +91,18 @@ impl<R: Read> Read for CountedReader<R> {
         let count = self.inner.read(buffer)?;
         self.progress.advance(count as u64);
         Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_long_work_have_lines_where_no_bar_is_seen() {
+        let mut progress = Progress::new("starting", 3);
+        assert!(!progress.has_line(false));
+        progress.bar = progress.bar.clone().with_elapsed(2 * PATIENCE);
+        assert!(progress.has_line(false) && !progress.has_line(true));
     }
 }

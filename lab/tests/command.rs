@@ -355,7 +355,7 @@ fn what_is_left_out_is_told() {
             _ => "nan.obj: one triangle that is not finite is left out\n",
         };
         let said = told("nan.obj");
-        assert!(said.starts_with(expected) && (said.is_empty() == expected.is_empty()), "{said}");
+        assert!(said.contains(expected) && said.is_empty() == expected.is_empty(), "{said}");
         let said = told("a.obj+eye.gltf");
         assert_eq!(said.matches("eye.gltf: not shown: 1 camera\n").count(), 1, "{command}: {said}");
     }
