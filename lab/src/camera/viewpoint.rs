@@ -5,6 +5,7 @@
 //! a room with an open side    in through that side
 //! a room                  from within: the place and the direction that see farthest
 //! a sheet that faces x    from the right, a little above
+//! a box                   so that three of its sides are seen
 //! anything else           from the front, a little above
 //! ```
 //!
@@ -33,6 +34,13 @@ const OPEN_SIDE: u16 = LEVEL / 12;
 
 /// The view of a thing that is not flat.
 const THING: View = View::Angles { azimuth: 15.0, elevation: 12.0 };
+
+/// The view of a box, whose front would hide the other sides from the view of a thing.
+const BOX: View = View::Angles { azimuth: 30.0, elevation: 25.0 };
+
+/// The places on each side of a box that are tried, as parts of its size, and the depth to which they lie on it.
+const ON_SIDE: [f32; 3] = [0.1, 0.5, 0.9];
+const BOX_DEPTH: f32 = 0.01;
 
 /// The view of a sheet that stands on edge toward the viewer, and the largest part of its height and depth that
 /// its width is: a wall that faces x.
@@ -68,12 +76,32 @@ pub fn choose(world: World<'_>, part: Bounds, is_all: bool, up: Up, lens: Option
     }
     let Point(middle) = Point::centre_of(part);
     if !is_all || !is_in_room(world, middle) {
-        return outside(THING);
+        return outside(if is_box(world, part) { BOX } else { THING });
     }
     match open_side(world, middle, up) {
         Some(azimuth) => outside(View::Angles { azimuth, elevation: 0.0 }),
         None => within(world, part, up, lens).unwrap_or_else(|| outside(THING)),
     }
+}
+
+/// Returns true if rays from outside meet a part on all six sides of its bounds.
+fn is_box(world: World<'_>, (min, max): Bounds) -> bool {
+    let places = || ON_SIDE.into_iter().flat_map(|u| ON_SIDE.map(|v| (u, v)));
+    let is_side = |axis: usize, is_far: bool| {
+        let size: [f32; 3] = core::array::from_fn(|axis| max[axis] - min[axis]);
+        let mut direction = [0.0; 3];
+        direction[axis] = if is_far { -1.0 } else { 1.0 };
+        places().all(|(u, v)| {
+            let mut origin = min;
+            origin[axis] = if is_far { max[axis] + size[axis] } else { min[axis] - size[axis] };
+            for (axis, part) in [((axis + 1) % 3, u), ((axis + 2) % 3, v)] {
+                origin[axis] += part * size[axis];
+            }
+            let hit = world.closest(&Ray::new(origin, direction));
+            hit.is_some_and(|hit| (hit.t - size[axis]).abs() <= BOX_DEPTH * size[axis])
+        })
+    };
+    (0..3).all(|axis| is_side(axis, false) && is_side(axis, true))
 }
 
 /// Returns true if the fronts of triangles are around a point in nearly all directions.
@@ -221,6 +249,21 @@ mod tests {
         solid.indices.iter_mut().for_each(|triangle| triangle.swap(0, 1));
         let (eye, _) = chosen(&solid);
         assert!(eye[2] > 4.0, "{eye:?}");
+    }
+
+    #[test]
+    fn boxes_show_three_sides_and_things_their_front() {
+        let mut solid = room(&[]);
+        solid.indices.iter_mut().for_each(|triangle| triangle.swap(0, 1));
+        let (eye, along) = chosen(&solid);
+        let is_past = (0..3).all(|axis| eye[axis] > 1.2 * [8.0, 3.0, 4.0][axis]);
+        assert!(is_past && along[0] < -0.3 && along[1] < -0.3, "{eye:?} {along:?}");
+        // A gable roof is no box.
+        for corner in solid.positions.iter_mut().filter(|corner| corner[1] > 0.0) {
+            corner[2] = 2.0;
+        }
+        let (_, along) = chosen(&solid);
+        assert!(along[0] > -0.3 && along[2] < -0.9, "{along:?}");
     }
 
     #[test]

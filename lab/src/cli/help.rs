@@ -29,7 +29,7 @@ Examples:
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render bunny.ply --json              the numbers, for programs
 
-Without a view, the camera stands in front of things, above flat scenes and within rooms.
+Without a view, the camera stands in front of things, above flat scenes and within rooms, and sees three sides of a box.
 A mesh that a glTF file shows more than once is built once and shown by instances. It becomes triangles with
 --shading heat or normals, with methods other than bvh, and if an instance flattens it.";
 
