@@ -91,6 +91,21 @@ pub fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).with_context(cannot)
 }
 
+/// Makes a folder for what `work` writes at its end. If it fails, a new folder that is still empty is removed.
+///
+/// # Errors
+/// Those of [`make_folder`] and of the work.
+pub fn in_folder<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let is_new = !path.exists();
+    make_folder(path)?;
+    let done = work();
+    if done.is_err() && is_new {
+        // This fails if something is in it.
+        let _ = fs::remove_dir(path);
+    }
+    done
+}
+
 /// Writes a picture of this width and height, rows from the top.
 ///
 /// # Errors
@@ -157,6 +172,17 @@ mod tests {
         make_folder(&folder.join("one")).unwrap();
         let message = make_folder(&path).unwrap_err().to_string();
         assert!(message.ends_with("`: it is a file: name a folder"), "{message}");
+        for (name, is_kept) in [("new", false), ("one/two", true)] {
+            let path = folder.join(name);
+            assert!(in_folder(&path, || anyhow::bail!("no such scene") as Result<()>).is_err());
+            assert_eq!(path.exists(), is_kept, "{name}");
+        }
+        let filled = folder.join("filled");
+        let work = || -> Result<()> {
+            fs::write(filled.join("a"), "")?;
+            anyhow::bail!("no second scene")
+        };
+        assert!(in_folder(&filled, work).is_err() && filled.join("a").exists());
         fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -430,6 +430,8 @@ fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
         let message = folder.refuses(words).unwrap();
         assert!(message.contains(expected), "{words}: {message}");
     }
+    assert!(folder.fails("figures nothing.ply -o new").unwrap().contains("cannot open it"));
+    assert!(!folder.0.join("new").exists());
     // What only the file can tell is another failure.
     assert_eq!(folder.hgrid("render nothing.ply").unwrap().status.code(), Some(1));
 }

@@ -47,7 +47,7 @@ use clap::ValueEnum as _;
 use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
-use crate::image::{check_sources, check_writable, make_folder};
+use crate::image::{check_sources, check_writable, in_folder};
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
@@ -67,9 +67,14 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let mut systems = methods_of(&args.methods, args.quality.unwrap_or_default());
     systems.extend(peers::systems(&args.peers)?);
-    if let Some(folder) = &args.output {
-        make_folder(folder)?;
+    match &args.output {
+        Some(folder) => in_folder(folder, || measure(args, systems)),
+        None => measure(args, systems),
     }
+}
+
+/// Measures, prints and writes, and draws into the folder, which is there.
+fn measure(args: &CompareArgs, mut systems: Vec<Box<dyn System>>) -> Result<()> {
     process::pin_to_one_core()?;
 
     process::keep_heap();
@@ -187,10 +192,10 @@ mod tests {
     }
 
     fn compare_of(shown: Shown, workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
-        measure(&[], shown, workloads, systems).unwrap()
+        measure_with(&[], shown, workloads, systems).unwrap()
     }
 
-    fn measure(
+    fn measure_with(
         words: &[&str],
         shown: Shown,
         workloads: &[Workload],
@@ -212,7 +217,8 @@ mod tests {
     #[test]
     fn rays_of_a_camera_that_sees_nothing_are_not_measured() {
         let away = ["--eye", "0,0,99", "--target", "0,0,199"];
-        let of = |workload| measure(&away, Shown::Mesh, &[workload], &methods(&[Method::Fixed]));
+        let of =
+            |workload| measure_with(&away, Shown::Mesh, &[workload], &methods(&[Method::Fixed]));
         for workload in [Workload::Primary, Workload::Ao, Workload::Bounce] {
             let message = format!("{:#}", of(workload).unwrap_err());
             assert!(message.contains("no ray hits anything"), "{message}");

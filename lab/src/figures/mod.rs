@@ -25,9 +25,12 @@ use crate::table::Results;
 /// # Errors
 /// If a scene cannot be loaded or built, or a file cannot be written.
 pub fn run(args: &FiguresArgs) -> Result<()> {
-    let folder = &args.output;
-    image::make_folder(folder)?;
+    image::in_folder(&args.output, || measure(args))
+}
 
+/// Measures and draws into the folder, which is there.
+fn measure(args: &FiguresArgs) -> Result<()> {
+    let folder = &args.output;
     let curves = density::Curves::measure(args)?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;
     if let Some(note) = curves.note() {
