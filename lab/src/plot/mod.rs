@@ -144,7 +144,7 @@ fn pixels(drawing: &impl Drawing) -> Result<((u32, u32), Vec<Rgb>)> {
         draw(drawing, &area, pen)?;
     }
     let size = (SHARPNESS * width, SHARPNESS * height);
-    Ok((size, averages(&bytes, size)))
+    Ok((size, averages(&bytes, size.0)))
 }
 
 fn draw<B: DrawingBackend>(drawing: &impl Drawing, area: &Area<B>, pen: Pen) -> Result<()> {
@@ -152,21 +152,25 @@ fn draw<B: DrawingBackend>(drawing: &impl Drawing, area: &Area<B>, pen: Pen) -> 
     drawn.and_then(|()| area.present()).map_err(|error| anyhow!("cannot draw: {error}"))
 }
 
-/// Averages the pixels of a picture of this size from one that is `SMOOTHNESS` times as large.
-fn averages(fine: &[u8], (width, height): (u32, u32)) -> Vec<Rgb> {
-    let (fine, _) = fine.as_chunks::<3>();
-    let row = (width * SMOOTHNESS) as usize;
-    let pixel = |x: u32, y: u32| {
-        let mut sum = [0u32; 3];
-        for line in fine.chunks_exact(row).skip((y * SMOOTHNESS) as usize).take(SMOOTHNESS as usize)
-        {
-            for color in line.iter().skip((x * SMOOTHNESS) as usize).take(SMOOTHNESS as usize) {
-                sum = [0, 1, 2].map(|i| sum[i] + u32::from(color[i]));
+/// Averages the pixels of a picture of this width from one that is `SMOOTHNESS` times as large.
+fn averages(fine: &[u8], width: u32) -> Vec<Rgb> {
+    let samples = SMOOTHNESS as usize;
+    let line_bytes = 3 * samples * width as usize;
+    let rows = fine.chunks_exact(samples * line_bytes).flat_map(|lines| {
+        let mut sums = vec![[0_u32; 3]; width as usize];
+        for line in lines.chunks_exact(line_bytes) {
+            for (sum, colors) in sums.iter_mut().zip(line.chunks_exact(3 * samples)) {
+                for [red, green, blue] in colors.as_chunks().0 {
+                    sum[0] += u32::from(*red);
+                    sum[1] += u32::from(*green);
+                    sum[2] += u32::from(*blue);
+                }
             }
         }
-        sum.map(|c| u8::try_from(c / (SMOOTHNESS * SMOOTHNESS)).unwrap_or(u8::MAX))
-    };
-    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+        sums
+    });
+    let average = |sum: u32| u8::try_from(sum / (SMOOTHNESS * SMOOTHNESS)).unwrap_or(u8::MAX);
+    rows.map(|sums| sums.map(average)).collect()
 }
 
 #[cfg(test)]
