@@ -1,7 +1,7 @@
 //! `hgrid_create`: builds a grid in memory that the library allocates. Needs the feature `malloc`.
 //!
-//! It adds nothing to what [`hgrid_sizes`] and [`hgrid_build`] do: it asks the first, gets so much
-//! memory, and does what the second does.
+//! It adds nothing to what [`hgrid_sizes`] and [`hgrid_build`] do: it asks for a bound, gets scratch, asks for the
+//! exact size, gets memory for the index, and builds.
 //!
 //! # Ownership
 //!

@@ -7,9 +7,9 @@
 //! `scene_surface`, `status` and `version` hold the functions, `types`, `query_types` and `blob_types` the structs,
 //! and `raw` every use of a caller's pointer.
 //!
-//! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
-//! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
-//! which vector instructions the processor has. Debug builds panic at the mistakes in `misuse`.
+//! This package allocates nothing, starts no thread, and has no panic that a caller could reach; a test looks in the
+//! library for symbols of these. Its only state is a byte in which core remembers which vector instructions the
+//! processor has. Debug builds panic at the mistakes in `misuse`.
 //!
 //! The feature `malloc` adds the module `create`, which does allocate: it gets memory from the caller's
 //! allocator or the system's, and keeps the pointers to it.

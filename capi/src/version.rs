@@ -1,4 +1,4 @@
-//! The identity of the library: its version, told once in `Cargo.toml` and checked here, and its methods.
+//! The identity of the library: its version, which is that of `Cargo.toml` (checked here), and its methods.
 
 use core::ffi::{CStr, c_char};
 

@@ -10,7 +10,7 @@
 //! distance of the origin   starts at      the walk and the filter are off the ray of the triangle test by
 //! up to 4 extents          the origin     nothing
 //! up to 2^29               the anchor     slack: 2^-23 of the anchor's coordinates + 2^-49 of the distance
-//! beyond                   the origin     more than the margin of the cells: the caller tests all triangles
+//! beyond                   no traversal   more than the margin of the cells, so the caller tests all triangles
 //! ```
 //!
 //! Slack: half an ulp of the anchor on each of two axes that the shear adds, 2^-23; the roundings in

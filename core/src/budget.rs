@@ -10,7 +10,7 @@ impl Budget {
         Self(work)
     }
 
-    /// Takes work off; false if there is less left.
+    /// Takes work off. Returns false and takes nothing if less is left: the traversal must end then.
     #[inline(always)]
     #[must_use]
     pub(crate) const fn take(&mut self, work: usize) -> bool {

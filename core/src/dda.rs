@@ -3,7 +3,7 @@
 //! ```text
 //! loop: read the list of the cell; axis = the one whose border ahead is nearest
 //!       done if the ray ends before that border, or the cell is the last on the axis
-//!       cell += step on the axis; border ahead = base + cell * delta, of the last cell the end of the walk
+//!       cell += step on the axis; border ahead = base + cell * delta; in the last cell, the walk's end
 //! ```
 //!
 //! Distances are measured in cells along the ray's longest axis, from where the ray enters the box; so they need no

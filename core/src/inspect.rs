@@ -1,4 +1,5 @@
-//! Statistics of a grid and its mesh, in one O(n) pass, for reports and for comparing grids.
+//! Statistics of a grid and its mesh, for reports and for comparing grids, in one visit of all lists and one of all
+//! triangles.
 
 use crate::aabb::Aabb;
 use crate::grid::Grid;

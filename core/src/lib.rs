@@ -3,8 +3,9 @@
 //! hgrid builds an acceleration structure over a triangle mesh, in memory that the caller brings, and answers ray
 //! queries on it. The default structure is a bounding volume hierarchy ([`Method::Bvh`]), a tree; the others are the
 //! four grids of the paper *Multi-Level Hashed Grid Construction Methods* (Costa, Pereira, Jorge, 2010). The API calls
-//! a tree a grid, too. No allocation, no threads, no I/O, no panic. Only `simd` contains `unsafe` code: it asks the
-//! processor for its vector instructions, makes the tokens that stand for them, and prefetches.
+//! a tree a grid, too. It allocates nothing without the feature `alloc`, starts no thread, does no I/O and never
+//! panics. Only `simd` contains `unsafe` code: it asks the processor for its vector instructions, makes the tokens that
+//! stand for them, and prefetches.
 //!
 //! ```
 //! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};

@@ -1,4 +1,4 @@
-//! Checks on lists of ids: the pairs of neighbours, and whether the ids ascend.
+//! Checks lists of ids: pairs each id with its neighbour, and tells whether they ascend.
 
 /// Each number with the one behind it. (`windows` and `is_sorted` of the standard library keep code
 /// to panic in a release build; this keeps none.)

@@ -8,7 +8,7 @@ pub(crate) const REMOVED_METHOD: u32 = 5;
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Method {
-    /// One level, row displacement compression (Lagae and Dutré 2008; the paper's baseline).
+    /// One level, row displacement compression (Lagae and Dutré 2008), on which the paper's grids build.
     OneLevel = 1,
     /// A fine one-level grid under macrocell levels (the paper's multi-level fixed grid, §3.2).
     Fixed = 2,

@@ -1,4 +1,4 @@
-//! Grids that own their memory and their mesh, for structs to hold: with the feature `alloc`.
+//! A grid that owns its memory and its mesh, so that a struct can hold it (feature `alloc`).
 //!
 //! ```text
 //! OwnedGrid
@@ -6,7 +6,7 @@
 //!   index   | up to 63 bytes | blob, from a multiple of 64 on | up to 63 bytes |
 //! ```
 //!
-//! Nothing refers to anything beside it, so the struct can move: a view is opened anew for each batch of queries,
+//! The struct holds no references, so it can move: a view is opened anew for each batch of queries,
 //! which is O(1). The regions are allocated as zeros of alignment 1, because Rust's allocators then call `calloc` and
 //! `realloc`: pages that the build does not touch are never mapped, and the rest is given back without a copy. With
 //! alignment 64, zeros would be written one by one, and shrinking would move them.

@@ -8,8 +8,8 @@
 //! range   all corners inside the ray's range: a hit; the hit clearly outside: a miss; else unsure
 //! ```
 //!
-//! The lanes do the same operations in the same order, none of them fused. Where that test goes on without rounding, a
-//! lane is unsure, and the pair is decided alone: one in some hundreds.
+//! The lanes do the same operations in the same order, none of them fused. Where `triangle` would compute without
+//! rounding, a lane is unsure, and the pair is decided alone: one in some hundreds.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8};

@@ -1,10 +1,10 @@
 //! Queries of one ray that take options.
 //!
-//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter gets the hits from near to far, and
-//! each triangle at most once. A grid finds hits in no exact order and repeats triangles, so a walk collects a few
-//! nearest hits in order and passes them to the filter. If the filter rejects them all, the next walk starts at the
-//! last of them. For a closest hit, the first walk collects one hit, the next two, then four: a filter that accepts the
-//! first hit costs no further walk.
+//! The triangle test culls; masks and the triangle to skip are looked up when a ray hits. A filter gets the hits from
+//! near to far, and each triangle at most once. No traversal finds hits in exact order, and one through cells repeats
+//! triangles, so a walk collects a few nearest hits in order and passes them to the filter. If the filter rejects them
+//! all, the next walk starts at the last of them. For a closest hit, the first walk collects one hit, the next two,
+//! then four: a filter that accepts the first hit costs no further walk.
 
 use crate::counters::Counters;
 use crate::grid::Grid;

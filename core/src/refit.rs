@@ -1,4 +1,4 @@
-//! Grids of meshes that move: new boxes for the same leaves, in place.
+//! Refits a tree to a mesh whose vertices moved: new boxes for the same leaves, in place.
 
 use crate::blob::{HasMesh, Header};
 use crate::error::Error;

@@ -1,11 +1,11 @@
-//! The methods of the library. Builds, opens, proofs and traversals are dispatched here; the header
-//! ([`blob`](crate::blob)), parameters ([`config`](crate::config)) and sizes ([`sizes`](crate::sizes)) have matches of
-//! their own.
+//! The methods of the library. Sizes, builds, opens and proofs are dispatched here, and the traversals of the four
+//! grids; `by_kind!` starts those of a tree. The header ([`blob`](crate::blob)) and parameters
+//! ([`config`](crate::config)) have matches of their own.
 //!
 //! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
-//! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build`, which
-//! take the method's own parameters, and a type that reads what was built; [`Structure`] is an enum of these types.
-//! CONTRIBUTING.md lists what a new method needs beside its line of the list at the end.
+//! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes`, `build` and
+//! `scratch_bytes`, which take the method's own parameters, and a type that reads what was built; [`Structure`] is an
+//! enum of these types. CONTRIBUTING.md lists what a new method needs beside its line of the list at the end.
 
 use crate::aabb::Aabb;
 use crate::arena::Sizes;

@@ -2,13 +2,13 @@
 //!
 //! A hit's point is off its triangle by rounding, so a ray that starts there may hit the triangle that it leaves. A ray
 //! that starts above the plane and leaves it does not: the triangle test decides exactly on which side of `t_min` the
-//! plane is met. How far above depends on the triangle alone, not on the scene's scale:
+//! plane is met. How far above depends on the triangle and the point alone, not on the scene's scale:
 //!
 //! ```text
-//! corners relative to the origin, L the largest coordinate of these:
+//! corners relative to the point, L the largest coordinate of these:
 //!   the point, in f64, is off the plane by                    6 * 2^-53 L
 //!   a triangle seen edge on may be hit from as far off as     2^-50 L      (triangle.rs)
-//!   what an origin is lifted by                               2^-20 L
+//!   the origin of the next ray is lifted by                   2^-20 L
 //! ```
 //!
 //! The lift is larger than necessary, for renderers that round the origin again. The origin is rounded away from the

@@ -4,7 +4,7 @@
 //! the slot empty, and a task that was never run is still there at the end. [`Shared`] holds words that all
 //! tasks write, no two of them the same word.
 //!
-//! Without atomic operations work is not cut, nor on microcontrollers, to save flash.
+//! Work is not cut on targets without atomic operations, nor, to save flash, on microcontrollers.
 
 use core::ops::Range;
 #[cfg(target_has_atomic = "32")]

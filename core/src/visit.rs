@@ -19,7 +19,8 @@ impl<'v> Visitor<'v> {
         Self { budget: Budget::new(words), leaf }
     }
 
-    /// Passes a list to the callback; `false` if the budget is used up.
+    /// Passes a list to the callback; `false` if less of the budget is left.
+    #[must_use]
     pub(crate) fn list(&mut self, ids: &[u32]) -> bool {
         self.spend(ids.len()) && {
             (self.leaf)(ids);
@@ -27,7 +28,8 @@ impl<'v> Visitor<'v> {
         }
     }
 
-    /// Takes words that lead to lists off the budget; `false` if it is used up.
+    /// Takes words that lead to lists off the budget; `false` if less is left.
+    #[must_use]
     pub(crate) fn spend(&mut self, words: usize) -> bool {
         self.budget.take(words)
     }

@@ -147,7 +147,7 @@ fn it_is_current() {
     }
     assert!(
         committed() == generated,
-        "include/hgrid.h is out of date: HGRID_BLESS=1 cargo test -p hgrid-tests --test c_abi"
+        "include/hgrid.h is out of date: HGRID_BLESS=1 cargo test --test c_abi"
     );
 }
 

@@ -12,7 +12,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hgrid_program_tests::readme::check_sizes;
+use hgrid_program_tests::sizes::check_sizes;
 use hgrid_tests::artefact::{cargo_in, library_dir, run, start_with, target_dir};
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;

@@ -109,7 +109,8 @@ fn sources() -> Vec<Source> {
     all.filter(|source| source.module != ["lib"]).collect()
 }
 
-/// Returns what the modules of a folder import from one another. A folder in it counts as one module.
+/// Returns what the modules of a folder import from one another. A folder in it counts as one module. What the folder
+/// itself exports again, as in `super::NAME`, counts as the folder's own.
 fn imports(sources: &[Source], folder: &[String]) -> Imports {
     let inside = |path: &[String]| path.strip_prefix(folder)?.first().cloned();
     let mut imports = Imports::new();

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hgrid_program_tests::readme::check_sizes;
+use hgrid_program_tests::sizes::check_sizes;
 use hgrid_tests::artefact::{compiler, root, run, static_library};
 use hgrid_tests::tools::leave_out;
 use tempfile::TempDir;

@@ -179,7 +179,7 @@ fn build(target_dir: &Path, features: &[&str]) -> PathBuf {
 }
 
 /// Copies a target folder of cargo, unless the copy is there, so that dependencies are not compiled again. `compiled`
-/// returns the folder once no cargo works in it; with a copy, nobody waits for that.
+/// returns the folder once no cargo works in it. It is not called if the copy is there, so nobody waits for a build.
 ///
 /// # Panics
 /// If there is no such folder, or the copy cannot be written.

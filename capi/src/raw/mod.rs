@@ -1,6 +1,6 @@
 //! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in `query` for
-//! queries, in `parts` for arrays of meshes, in `shapes` and `scene` for those. (`create` reads the head of a region,
-//! which it wrote itself.) `batch` checks the addresses of a batch before it reads them.
+//! queries, in `parts` for arrays of meshes, in `shapes` and `scene` for shapes and scenes. (`create` reads the head of
+//! a region, which it wrote itself.) `batch` checks the addresses of a batch before it reads them.
 //!
 //! # The contract with C
 //!

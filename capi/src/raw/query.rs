@@ -1,6 +1,6 @@
 //! Queries: rays, options and answers, by their addresses.
 //!
-//! "The caller's promise" is the contract at the head of the module above.
+//! "The caller's promise" is the contract at the head of `raw` (mod.rs).
 
 use core::ptr::NonNull;
 

@@ -1,6 +1,6 @@
 //! Scenes, by their addresses.
 //!
-//! "The caller's promise" is the contract at the head of the module above.
+//! "The caller's promise" is the contract at the head of `raw` (mod.rs).
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;

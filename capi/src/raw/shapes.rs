@@ -1,6 +1,6 @@
 //! Trees of the caller's shapes, by their addresses.
 //!
-//! "The caller's promise" is the contract at the head of the module above.
+//! "The caller's promise" is the contract at the head of `raw` (mod.rs).
 
 use core::ffi::c_void;
 use core::ptr::NonNull;

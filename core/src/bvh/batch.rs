@@ -3,7 +3,7 @@
 //! ```text
 //! for each window of rays, as many as there is memory to sort:
 //!     sort them if they are scattered (order.rs)
-//!     for each 64: trace them as a group (group.rs), answer each in its place; those that cannot go along, alone
+//!     for each 64: trace them as a group (group.rs), and those alone that it hands back; answer each in its place
 //! ```
 
 use super::Bvh;

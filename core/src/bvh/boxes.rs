@@ -7,7 +7,7 @@
 //! more rays   sixteen against one box
 //! ```
 //!
-//! The test of a group is that of [`slab`](super::slab) with other roundings. Let u = 2^-24, and measure from the
+//! Groups use the slab test of [`slab`](super::slab), rounded differently. Let u = 2^-24, and measure from the
 //! origin of the first ray that is not done. A distance is `side * inverse - origin * inverse`; the second product is
 //! computed once a ray.
 //!

@@ -1,4 +1,4 @@
-//! The census: the key of every triangle, how many fall into each bin, and the box around them all.
+//! The census: the key of every triangle, how many fall into each bin, and the box around all triangles.
 //!
 //! ```text
 //! for each task:              a share of the triangles, and counts of its own

@@ -14,7 +14,7 @@
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
-//! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
+//! A group may hold any rays: those of a camera share most nodes, those from a surface the first ones.
 
 use fearless_simd::Simd;
 
@@ -24,7 +24,7 @@ use super::group_leaf::{BoxLeaves, Leaf, Leaves, Offer, Scattered, TriangleLeave
 use super::interleave;
 use super::met::Met;
 use super::node::{Child, WIDTH};
-use super::rays::{GROUP, OCTETS, Rays};
+use super::rays::{GROUP, Rays};
 use super::stack::{GroupEntry, GroupStack};
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
@@ -245,8 +245,6 @@ fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiti
         *slot = waiting;
     }
 }
-
-const _: () = assert!(GROUP == 8 * OCTETS);
 
 #[cfg(test)]
 mod tests {

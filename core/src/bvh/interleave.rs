@@ -74,6 +74,7 @@ pub(super) fn trace<S: Simd>(
             }
             let Some(child) = one.child else { continue };
             are_done = false;
+            // A leaf takes three turns and counts once.
             let is_new = one.turns == 0;
             if is_new && !one.budget.take(1) {
                 one.child = None;

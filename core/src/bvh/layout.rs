@@ -5,7 +5,7 @@
 //! scratch  | counts of the bins, for each task  | entries: 8 B a triangle | spare: 8 B a triangle |
 //! ```
 //!
-//! The bounds depend on the number `n` of triangles alone:
+//! The bounds of quality `fast` depend on the number `n` of triangles alone ([`high`](super::high) has its own):
 //!
 //! - A node has eight children, unless its subtree has fewer triangles (a root of a small mesh) or fewer
 //!   roots. So each node below a root replaces one range of ids by eight: (m - 1) / 7 nodes at most for
@@ -16,12 +16,13 @@
 //! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
 //!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
-//! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a crowded bin.
-//!   A crowded bin has more than [`CROWD`] triangles, and divisions nest at most [`DIVISIONS`] deep.
+//! - The last unit behind the crowded bins may have too few triangles for a root, and so may the last one of each
+//!   division of a crowded bin: one more root for each. A crowded bin has more than [`CROWD`] triangles, and divisions
+//!   nest at most [`DIVISIONS`] deep.
 //!
 //! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles. A bin is
-//! sorted with `spare` as the second buffer. Only bins of more than [`CROWD`] entries need more of it than that: room
-//! for their centres that the index does not have, 8 bytes a triangle without an index.
+//! sorted with `spare` as the second buffer. Only bins of more than [`CROWD`] entries need more of it than the length
+//! of the largest bin: room for their centres that the index does not have, 8 bytes a triangle without an index.
 //!
 //! So constants bound index and scratch, those of a build with one task (`HGRID_INDEX_BOUND`, 16 n + 640, and
 //! `HGRID_SCRATCH_BOUND`, 17 n + 320, in C; a test compares them for many `n`):
@@ -41,8 +42,9 @@ use crate::blob::HEADER_BYTES;
 
 use super::node::Node;
 
-/// Levels of nodes, at most. Quality `fast` makes up to 49: 20 by SAH and 9 that halve roots ([`top`](super::top)), and 20 of a
-/// subtree, which has at most 20 nodes ([`subtree`](super::subtree)). Quality `high` makes up to 35 ([`high`](super::high)). The rest is reserve.
+/// Levels of nodes, at most. Quality `fast` makes up to 49: 20 by SAH and 9 that halve roots ([`top`](super::top)), and
+/// 20 of a subtree, which has at most 20 nodes ([`subtree`](super::subtree)). Quality `high` makes up to 35
+/// ([`high`](super::high)). The rest is reserve.
 pub(crate) const LEVELS: u32 = 64;
 
 /// Triangles for each root, at least, on average.

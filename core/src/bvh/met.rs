@@ -15,6 +15,9 @@ use super::node::WIDTH;
 use super::rays::{GROUP, Rays};
 use crate::extremes::Extremes;
 
+// Masks of rays are 64 bits, and `one_by_one` takes them in two halves.
+const _: () = assert!(GROUP == 64);
+
 /// With more rays than this, the beam of all rays is tested before the rays.
 const FEW_RAYS: u32 = 8;
 

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Each triangle stands in one leaf. So index and scratch are bounded by the number of triangles alone,
-//! wherever they lie ([`layout`]).
+//! wherever the triangles lie ([`layout`]).
 //!
 //! The modules:
 //!

@@ -11,14 +11,14 @@
 //!
 //! Distances are squared and in f32. A bound must never drop a triangle that the test in f64 would report:
 //!
-//! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the tree is one to
+//! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the tree's box is one to
 //!   two away. No square overflows, and what underflows in one is below [`TINY`].
 //! - **Boxes.** A side relative to the point has two roundings. Where the node lies within 2^9 steps of the
 //!   point, they are below 2^-13 steps, which the margin of quantised boxes absorbs
 //!   ([`node`](super::node)). Elsewhere terms lose no more than a bit by cancelling: 3 * 2^-24 of the side,
 //!   9 * 2^-24 of the squared distance.
 //! - **Triangles.** A scalar product of corners with a direction has four roundings a term ([`DOTS`] is
-//!   twice that), and what follows has eight.
+//!   twice that), and what is computed from it has eight.
 //! - **Reach.** Five roundings: with those above they are below 2^-20 ([`WIDER`]).
 //! - **The test** reports a point that is off the triangle by less than 2^-45 of the largest coordinate. So
 //!   the distance that it reports may be smaller by that, and the reach grows by `slack`.
@@ -74,7 +74,7 @@ impl Point {
     #[inline(always)]
     fn new(point: [f32; 3], bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        // Find the distance to the farthest side of the tree, and its largest coordinate.
+        // Find the distance to the farthest side of the tree's box, and its largest coordinate.
         let (mut farthest, mut largest) = (0.0, 0.0);
         for axis in 0..3 {
             // Quarters do not overflow.

@@ -9,10 +9,11 @@
 //!                  not there       otherwise; its box is inside out, so that single rays do not meet it
 //! ```
 //!
-//! The quantised box holds the exact one and at least a sixty-fourth of a step more on each side. This margin absorbs
-//! the rounding of `bound * step + (origin - ray origin)` where the ray starts near the node: there the terms are below
-//! 2^9 steps, so three roundings are below 2^-13 steps. Where the ray starts far away, the error is relative, and the
-//! far side of a slab test has a margin for it ([`slab`](super::slab)).
+//! A build makes the quantised box a sixty-fourth of a step larger than the exact one on each side. Rounding takes a
+//! part of that; `validate` demands a 128th. This margin absorbs the rounding of `bound * step + (origin - ray origin)`
+//! where the ray starts near the node: there the terms are below 2^9 steps, so three roundings are below 2^-13 steps.
+//! Where the ray starts far away, the error is relative, and the far side of a slab test has a margin for it
+//! ([`slab`](super::slab)).
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, i32x8, u8x16, u16x8, u32x4, u32x8};
@@ -306,7 +307,7 @@ pub(crate) fn least_node(bounds: &Aabb) -> f32 {
     bounds.size().max_element() * LEAST_NODE
 }
 
-/// Two rows of eight sides as floats.
+/// Twice eight bytes as floats, such as two rows of sides.
 #[inline(always)]
 pub(crate) fn floats<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>, f32x8<S>) {
     let both: [u8; 16] = transmute!([low, high]);

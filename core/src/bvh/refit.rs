@@ -3,7 +3,8 @@
 //! ```text
 //! check   the mesh has the triangles of the tree; walking down from the root meets each node once
 //! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; unite those of
-//!         each leaf, the last of them repeated up to eight; quantise, hand the union of all to the parent
+//!         each leaf (a short leaf repeats its last box, so that eight are united); quantise; hand the union of all to
+//!         the parent
 //! again   if unused vertices widened the box of the tree so far that a node was too thin for it
 //! ```
 //!

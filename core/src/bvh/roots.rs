@@ -2,7 +2,7 @@
 //! ([`top`](super::top)) treats each as one item.
 //!
 //! ```text
-//! for each unit (a crowded bin, or bins side by side that make up a root):
+//! for each unit (a crowded bin, or bins side by side with enough triangles for their roots):
 //!     too large to sort: new keys in the box around its centres, new bins; then their units
 //!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!

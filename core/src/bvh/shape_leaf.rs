@@ -1,5 +1,5 @@
 //! Leaves of a tree over shapes: tests a ray against the boxes of up to eight shapes, as it is tested against
-//! the children of a node. ([`walk`](super::walk) tests the triangles of a leaf.)
+//! the children of a node. [`walk`](super::walk) has this test with vectors, and that of triangles.
 //!
 //! A box is six numbers in the caller's memory, not quantised, so it has no margin of its own. Each side is
 //! subtracted and multiplied with two roundings, which the wider inverse of far sides absorbs

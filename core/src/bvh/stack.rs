@@ -1,7 +1,7 @@
 //! Stacks: the children that wait until a ray, or a group of rays, has been through those before them.
 //!
-//! A ray goes on with the nearest child of a node and pushes the others, the nearest last. One that begins behind the
-//! end of the ray when it is popped is dropped.
+//! A ray goes on with the nearest child of a node and pushes the others, the nearest last. A child that begins
+//! behind the end of the ray when it is popped is dropped.
 
 use zerocopy::{FromBytes, IntoBytes, transmute_mut};
 

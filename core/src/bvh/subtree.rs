@@ -11,6 +11,8 @@
 //!                            quantise all eight
 //! ```
 //!
+//! A subtree with too many nodes for the memory bound is cut again, by halves only.
+//!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
 

@@ -6,8 +6,9 @@
 //! ```text
 //! each crowded bin is a unit; balance = 0
 //! for each other bin: add it to the unit
-//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; 0 if it is more and a task may end here
-//!     if left is not negative, and no bin is behind or they have enough for a root: end the unit; balance = left
+//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; above 0 and at a seam: 0
+//!     if left is not negative, and no bin follows or left and the rest are enough for a root: end the unit,
+//!         balance = left
 //! ```
 
 use core::ops::Range;

@@ -1,18 +1,17 @@
-//! Traverses the tree with a single ray, nearest child first, and tests the triangles of the leaves.
+//! Traverses the tree with a single ray, nearest child first; tests the triangles of leaves, or offers their shapes.
 //!
 //! ```text
 //! node = root
 //! loop: intersect the ray with the eight boxes of the node
 //!       descend into the nearest child that is met, push the others, the nearest last
 //!       a leaf: filter its triangles, all eight together; decide those that pass one by one in f64;
-//!               a hit ends the ray there
+//!               a hit is the new end of the ray
 //!       pop the next child that the ray enters before its end
 //! ```
 //!
-//! Two things cost a ray more than its arithmetic. A child's place follows from the boxes of its node, so one node
-//! waits for the other: [`predicted`] jumps to the child, so that the processor can guess it. And a stack for the
-//! deepest tree takes as long to zero as a node to test: a ray begins on a short one, and [resumes](Resume) on a
-//! larger one if that is full.
+//! Two things cost a ray more than its arithmetic. The address of the next node is known only once this one is tested:
+//! [`predicted`] jumps to the child, so that the processor can guess it. And a stack for the deepest tree takes as long
+//! to zero as a node to test: a ray begins on a short one, and [resumes](Resume) on a larger one if that is full.
 
 use core::hint::black_box;
 
@@ -318,9 +317,10 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                     return Walked::Full;
                 }
                 tally.grid_step();
-                let Some(node) = bvh.nodes.get(number as usize).filter(|_| budget.take(1)) else {
+                let Some(node) = bvh.nodes.get(number as usize) else { return Walked::Through };
+                if !budget.take(1) {
                     return Walked::Through;
-                };
+                }
                 // Intersect the ray with the eight boxes of the node.
                 let (met, near) = match wide {
                     Some(ray) => ray.meet(simd, node, flips, end),

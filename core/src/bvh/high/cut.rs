@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! for each triangle:  bin of its centre on each axis; grow the bins' boxes, count
-//! for each axis:      sweep from both ends; cost of a cut = area * count of either side
+//! for each axis:      sweep from both ends; cost of a cut = area * count, summed over both sides
 //! for each triangle:  swap it to the first part, or leave it; grow the box of its part's centres
 //! ```
 //!
