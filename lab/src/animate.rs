@@ -49,7 +49,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let scene = Scene::load(&args.scene)?;
     let name = args.scene.display();
     ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
-    tell(&scene)?;
+    tell(&scene);
     if let Some(folder) = &args.output {
         image::make_folder(folder)?;
     }

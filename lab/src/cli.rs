@@ -85,19 +85,21 @@ impl Cli {
 
     /// Refuses options that have no effect or contradict each other.
     fn checked(self) -> Result<Self, clap::Error> {
-        let checked = match &self.command {
-            Command::Render(args) => args.check(),
-            Command::Pack(args) => args.check(),
-            Command::Table(args) => args.race.check(),
-            Command::Figures(args) => args.check(),
-            Command::Animate(args) => args.check(),
-            Command::Compare(args) => args.check(),
-            _ => Ok(()),
+        let (name, checked) = match &self.command {
+            Command::Render(args) => ("render", args.check()),
+            Command::Pack(args) => ("pack", args.check()),
+            Command::Table(args) => ("table", args.race.check()),
+            Command::Figures(args) => ("figures", args.check()),
+            Command::Animate(args) => ("animate", args.check()),
+            Command::Compare(args) => ("compare", args.check()),
+            _ => return Ok(self),
         };
-        match checked {
-            Ok(()) => Ok(self),
-            Err(error) => Err(Self::command().error(ErrorKind::ArgumentConflict, error)),
-        }
+        let Err(error) = checked else { return Ok(self) };
+        let mut cli = Self::command();
+        // Sets the names that usages begin with.
+        cli.build();
+        let command = cli.find_subcommand_mut(name).map(|command| command.to_owned());
+        Err(command.unwrap_or(cli).error(ErrorKind::ArgumentConflict, error))
     }
 }
 
@@ -361,7 +363,7 @@ impl CompareArgs {
         if let Some((option, _)) = self.shown().option() {
             ensure!(
                 has_tree,
-                "{option} is for bvh and Embree: add bvh to --methods, or leave out {option}"
+                "{option} compares bvh with Embree: add bvh to --methods, or leave out {option}"
             );
         }
         Ok(())

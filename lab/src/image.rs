@@ -88,20 +88,23 @@ pub fn make_folder(path: &Path) -> Result<()> {
     let cannot = || format!("cannot write into `{}`", path.display());
     let is_file = path.exists() && !path.is_dir();
     ensure!(!is_file, "{}: it is a file: name a folder", cannot());
+    let is_link_to_nothing = path.is_symlink() && !path.exists();
+    ensure!(!is_link_to_nothing, "{}: it is a link to what is not there", cannot());
     fs::create_dir_all(path).with_context(cannot)
 }
 
-/// Makes a folder for what `work` writes at its end. If it fails, a new folder that is still empty is removed.
+/// Makes a folder for what `work` writes at its end. If it fails, new folders that are still empty are removed.
 ///
 /// # Errors
 /// Those of [`make_folder`] and of the work.
 pub fn in_folder<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let is_new = !path.exists();
+    let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+    let new: Vec<_> = path.ancestors().take_while(is_new).collect();
     make_folder(path)?;
     let done = work();
-    if done.is_err() && is_new {
-        // This fails if something is in it.
-        let _ = fs::remove_dir(path);
+    if done.is_err() {
+        // It ends at the first folder that has something in it.
+        let _ = new.into_iter().try_for_each(fs::remove_dir);
     }
     done
 }

@@ -127,7 +127,7 @@ impl Facts {
         let file = &*file.to_string_lossy();
         if file.starts_with("procedural:") || !path.exists() {
             let scene = Scene::load(path)?;
-            tell_hidden(&scene)?;
+            tell_hidden(&scene);
             let parts = scene.geometries.len().max(1);
             let format = if parts > 1 { "A+B" } else { "formula" };
             return Ok(Self::Mesh(MeshFacts::of(file, format, [parts; 2], &scene)));
@@ -150,7 +150,7 @@ impl Facts {
             hidden,
             ..Scene::default()
         };
-        tell_hidden(&scene)?;
+        tell_hidden(&scene);
         Ok(Self::Mesh(MeshFacts::of(file, format.name(), counts, &scene)))
     }
 }

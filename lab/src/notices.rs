@@ -5,24 +5,23 @@ use std::io::{self, Write as _};
 use crate::plural::counted;
 use crate::scene::Scene;
 
-/// Tells of what the files of a scene have that is not read.
-///
-/// # Errors
-/// Those of writing.
-pub(crate) fn tell_hidden(scene: &Scene) -> io::Result<()> {
-    scene.hidden.iter().try_for_each(|hidden| writeln!(io::stderr(), "{hidden}"))
+/// Tells of what the files of a scene have that is not read. Nothing is lost if nobody can read it.
+pub(crate) fn tell_hidden(scene: &Scene) {
+    scene.hidden.iter().for_each(|hidden| say(hidden));
 }
 
 /// Tells of the same, and of triangles that are left out.
-///
-/// # Errors
-/// Those of writing.
-pub(crate) fn tell(scene: &Scene) -> io::Result<()> {
-    tell_hidden(scene)?;
-    match left_out(scene.not_finite_count()) {
-        Some(left_out) => writeln!(io::stderr(), "{}: {left_out}", scene.name),
-        None => Ok(()),
+pub(crate) fn tell(scene: &Scene) {
+    tell_hidden(scene);
+    if let Some(left_out) = left_out(scene.not_finite_count()) {
+        say(&format!("{}: {left_out}", scene.name));
     }
+}
+
+/// Writes a line to standard error, if that takes it: a closed pipe there must not end the work.
+pub(crate) fn say(line: &str) {
+    // Not `eprintln`, which panics if nothing can be written.
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Returns the words for triangles that a build leaves out; nothing if there are none.

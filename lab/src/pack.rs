@@ -29,7 +29,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
-    tell(&scene)?;
+    tell(&scene);
     let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
     let blob = pack(&scene, &config, args.density).with_context(cannot)?;

@@ -2,14 +2,17 @@
 //!
 //! The bar appears on standard error after a second, only if that is a terminal, and disappears when the work
 //! is done. Standard output belongs to the results, and a bar that flashes by is of no use. Generating,
-//! loading and measuring share it. If standard error is a file or a pipe, each step after that second gets a line
-//! in place of the bar.
+//! loading and measuring share it. If standard error is a file or a pipe, steps of a measurement get a line in place of
+//! the bar, one a second at most.
 
+use core::cell::Cell;
 use core::fmt;
 use core::time::Duration;
-use std::io::{self, IsTerminal as _, Read, Write as _};
+use std::io::{self, IsTerminal as _, Read};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::notices::say;
 
 /// The time that work may take before the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -19,6 +22,8 @@ pub struct Progress {
     bar: ProgressBar,
     scope: String,
     is_shown: bool,
+    /// The time of the last line, from the start on.
+    told: Cell<Duration>,
 }
 
 impl Progress {
@@ -31,7 +36,7 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_message(what.into());
-        Self { bar, scope: String::new(), is_shown: false }
+        Self { bar, scope: String::new(), is_shown: false, told: Cell::default() }
     }
 
     /// Counts `amount` more. Call it per row or per buffer, not per element.
@@ -47,15 +52,15 @@ impl Progress {
     pub fn set_message(&self, what: &str) {
         let message = format!("{}{what}", self.scope);
         if self.has_line(io::stderr().is_terminal()) {
-            // Not `eprintln`, which panics if nothing can be written.
-            let _ = writeln!(io::stderr(), "{message}");
+            say(&message);
+            self.told.set(self.bar.elapsed());
         }
         self.bar.set_message(message);
     }
 
     /// Returns true if the step that begins gets a line.
     fn has_line(&self, is_terminal: bool) -> bool {
-        !is_terminal && self.bar.elapsed() > PATIENCE
+        !is_terminal && self.bar.elapsed() > self.told.get() + PATIENCE
     }
 
     /// Sets the words that come before all further messages.
@@ -104,5 +109,7 @@ mod tests {
         assert!(!progress.has_line(false));
         progress.bar = progress.bar.clone().with_elapsed(2 * PATIENCE);
         assert!(progress.has_line(false) && !progress.has_line(true));
+        progress.set_message("first");
+        assert!(io::stderr().is_terminal() || !progress.has_line(false));
     }
 }

@@ -11,8 +11,7 @@ use crate::resident::resident_bytes;
 use crate::threads::Threads;
 
 /// The reason why a grid has fewer cells than its configuration asks for: a limit of the core (docs/bounds.md).
-pub(crate) const TOO_DENSE: &str =
-    "asks for more cells than this mesh can have, with at most 16 references to each triangle";
+pub(crate) const TOO_DENSE: &str = "a grid has at most 16 references to each triangle";
 
 /// The index and the scratch of a grid.
 pub(crate) struct Regions {
@@ -65,7 +64,9 @@ impl Regions {
             && let Some(built) = grid.config().parameters.density()
             && built < asked
         {
-            bail!("--density {asked} {TOO_DENSE}: it can have --density {built}");
+            bail!(
+                "--density {asked} is too much for this mesh, because {TOO_DENSE}; --density {built} fits"
+            );
         }
         Ok(())
     }

@@ -76,7 +76,7 @@ impl Results {
         let scenes = scenes.iter().map(|spec| {
             let (scene, spec) = (Scene::load(spec)?, spec.display());
             ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
-            tell(&scene)?;
+            tell(&scene);
             let facts = SceneFacts::of(&scene);
             progress.set_scope(&display_name(&facts.scene));
             let methods = measure_diffuse(&scene, &configs, race, &mut progress)

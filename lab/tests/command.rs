@@ -3,7 +3,7 @@
 use std::fs;
 use std::io;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 /// A temporary folder with a mesh in it.
 struct Folder(PathBuf);
@@ -355,6 +355,19 @@ fn what_is_left_out_is_told() {
     }
 }
 
+/// Nobody has to read what is told.
+#[test]
+fn notices_that_nobody_reads_end_no_command() {
+    let folder = Folder::new("unread").unwrap();
+    fs::write(folder.0.join("nan.obj"), "v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n")
+        .unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+    command.current_dir(&folder.0).args(["pack", "nan.obj", "-o", "a.HGRID"]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert!(child.wait().unwrap().success() && folder.0.join("a.HGRID").exists());
+}
+
 #[test]
 fn a_blob_can_be_an_array_of_c() {
     let folder = Folder::new("c").unwrap();
@@ -396,7 +409,7 @@ fn a_density_that_a_mesh_cannot_have_is_refused() {
         let words = format!("{words} {knot}");
         folder.says(&format!("{words} --density 32")).unwrap();
         let said = folder.fails(&format!("{words} --density 128")).unwrap();
-        let expected = "at most 16 references to each triangle: it can have --density 32";
+        let expected = "at most 16 references to each triangle; --density 32 fits";
         assert!(said.contains(expected), "{words}: {said}");
     }
     let words = "figures procedural:knot:2000 --size 16 --repeat 1 --methods one-level --densities";
@@ -413,13 +426,13 @@ fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
     for (words, expected) in [
         ("a.obj -o -", "it cannot be standard output: name a file"),
         ("a.obj -o a.jpg", "pictures are PNG, so name it a.png"),
-        ("a.obj --density x --method fixed", "a density is a number above 0, like 4 or 0.5"),
+        ("a.obj --density x --method fixed", "a density is a finite number above 0, like 4 or 0.5"),
         ("a.obj --density 4", "--density is not for bvh"),
         ("figures a.obj --methods bvh", "figure 1 shows densities, which bvh has none of"),
-        ("figures a.obj --densities 0", "a density is a number above 0"),
+        ("figures a.obj --densities 0", "a density is a finite number above 0"),
         ("animate a.obj --method fixed --refit -o b", "--refit is for --method bvh"),
         ("compare a.obj --methods fixed --spheres -o b", "cannot be used with"),
-        ("compare a.obj --methods fixed --spheres", "--spheres is for bvh and Embree: add bvh"),
+        ("compare a.obj --methods fixed --spheres", "--spheres compares bvh with Embree: add bvh"),
     ] {
         let message = folder.refuses(words).unwrap();
         assert!(message.contains(expected), "{words}: {message}");

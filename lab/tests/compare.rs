@@ -110,7 +110,7 @@ fn instances_are_not_for_other_methods_and_peers() {
     let output = hgrid(words).unwrap();
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(
-        !output.status.success() && error.contains("--instances is for bvh and Embree"),
+        !output.status.success() && error.contains("--instances compares bvh with Embree"),
         "{error}"
     );
 }

@@ -35,7 +35,10 @@ impl FromStr for Aim {
     fn from_str(word: &str) -> Result<Self> {
         match named::name(word) {
             Some(name) => Ok(Self::Named(name)),
-            None => word.parse().map(Self::Side).map_err(|error| {
+            None => word.parse().map(Self::Side).map_err(|error: Error| {
+                if word.contains(',') {
+                    return error;
+                }
                 anyhow!("{error}; some scenes have named views, too, which --help lists")
             }),
         }

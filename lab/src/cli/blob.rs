@@ -63,7 +63,9 @@ impl PackArgs {
         self.tuning.check("--method", &[method])?;
         let has_ending = |endings: &[&str]| {
             let ending = self.output.extension();
-            ending.is_some_and(|ending| endings.iter().any(|known| ending == *known))
+            ending.is_some_and(|ending| {
+                endings.iter().any(|known| ending.eq_ignore_ascii_case(known))
+            })
         };
         match &self.c_array {
             None => {

@@ -72,7 +72,10 @@ fn negative_numbers_are_refused_by_their_range() {
     ] {
         let words = ["hgrid"].into_iter().chain(words.split(' '));
         let message = Cli::try_parse_from(words).unwrap_err().to_string();
-        assert!(message.contains("is not in") && !message.contains("-- -"), "{message}");
+        assert!(
+            message.contains("it is no whole number from") && !message.contains("-- -"),
+            "{message}"
+        );
     }
 }
 
@@ -81,12 +84,12 @@ fn numbers_that_are_not_whole_are_refused_by_their_range() {
     for (words, expected) in [
         ("render --size 1e9", "'1e9' for '--size <PIXELS>': it is no whole number from 1 to 16384"),
         ("render --size 1920x1080", "it is no whole number from 1 to 16384"),
-        ("render --size 100000000000000000000", "is not in 1..=16384"),
+        ("render --size 100000000000000000000", "it is no whole number from 1 to 16384"),
         ("render --threads 1.5", "it is no whole number from 1 to 64"),
-        ("render --heat-top 0", "0 is not in 1..=4294967295"),
+        ("render --heat-top 0", "it is no whole number, 1 or more"),
         ("render --depth two", "it is no whole number from 1 to 4"),
-        ("render --depth 5", "5 is not in 1..=4"),
-        ("render --macrocell-factor 1", "1 is not in 2..=4294967295"),
+        ("render --depth 5", "it is no whole number from 1 to 4"),
+        ("render --macrocell-factor 1", "it is no whole number, 2 or more"),
         ("table a.ply --repeat NaN", "it is no whole number from 1 to 1000"),
     ] {
         let words = ["hgrid"].into_iter().chain(words.split(' '));
@@ -95,7 +98,7 @@ fn numbers_that_are_not_whole_are_refused_by_their_range() {
     }
 }
 
-/// The help of an option names the limit that its parser has: the next number is refused by that limit.
+/// The help of an option names the limit that its parser has: it takes that number, and not the next one.
 #[test]
 fn the_help_names_limits() {
     let of_help = |command: &str, option: &str| {
@@ -131,6 +134,14 @@ fn the_help_names_limits() {
         assert!(is_value, "{words}: {error}");
         let help = of_help(said[1], said[2].trim_start_matches('-'));
         assert!(help.contains(limit), "{words}: {help}");
+        // Small numbers are below a least one, which the help tells.
+        let number: u32 = said[3].parse().unwrap();
+        if number > 2 {
+            let greatest = (number - 1).to_string();
+            let words = [&said[..3], &[greatest.as_str()]].concat();
+            let refused = Cli::try_parse_from(&words).err().map(|error| error.kind());
+            assert_ne!(refused, Some(ErrorKind::ValueValidation), "{words:?}");
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! The values of options: parsers that say what they take to who writes something else.
 
 use core::fmt;
-use core::num::IntErrorKind;
 use core::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -19,14 +18,16 @@ where
     T: Copy + PartialOrd + fmt::Display + TryFrom<i64> + Send + Sync + 'static,
 {
     move |word: &str| {
-        let (start, end) = (range.start(), range.end());
-        let number = match word.parse::<i64>().map_err(|error| *error.kind()) {
-            Ok(number) => T::try_from(number).ok(),
-            Err(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => None,
-            Err(_) => return Err(format!("it is no whole number from {start} to {end}")),
-        };
-        let number = number.filter(|number| range.contains(number));
-        number.ok_or_else(|| format!("{word} is not in {start}..={end}"))
+        let number = word.parse::<i64>().ok().and_then(|number| T::try_from(number).ok());
+        number.filter(|number| range.contains(number)).ok_or_else(|| {
+            let (start, end) = (range.start(), range.end().to_string());
+            // The greatest number of 32 bits is no limit that a user has to know.
+            if end == u32::MAX.to_string() {
+                format!("it is no whole number, {start} or more")
+            } else {
+                format!("it is no whole number from {start} to {end}")
+            }
+        })
     }
 }
 
@@ -51,7 +52,7 @@ pub(super) fn quality_parser() -> impl TypedValueParser<Value = Quality> {
 /// Parses a density. How many cells a mesh can have is known only once its triangles are counted in them.
 pub(super) fn density(word: &str) -> Result<f32, &'static str> {
     let density = word.parse().ok().filter(|density: &f32| *density > 0.0 && density.is_finite());
-    density.ok_or("a density is a number above 0, like 4 or 0.5")
+    density.ok_or("a density is a finite number above 0, like 4 or 0.5")
 }
 
 /// Parses the name of a file or a folder to write.

@@ -238,7 +238,7 @@ impl SceneNumbers {
     ) -> Result<Self> {
         let mut scene = Scene::load(spec)?;
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
-        tell(&scene)?;
+        tell(&scene);
         let bounds = scene.whole_bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
         let shown = plan.shown;

@@ -52,7 +52,7 @@ impl Curves {
         ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
         // Figure 2 tells of its own scenes.
         if args.figure1.is_some() {
-            tell(&scene)?;
+            tell(&scene);
         }
         let facts = SceneFacts::of(&scene);
 
@@ -88,12 +88,25 @@ impl Curves {
 }
 
 impl Curves {
+    /// Refuses charts without a point.
+    ///
+    /// # Errors
+    /// If the mesh can have none of the densities.
+    pub(super) fn check(&self) -> Result<()> {
+        let mut points = self.methods.iter().flat_map(Curve::points);
+        ensure!(
+            points.next().is_some(),
+            "figure 1 would show nothing, because {TOO_DENSE}: name smaller --densities"
+        );
+        Ok(())
+    }
+
     /// Returns a sentence about the densities that the charts do not show; nothing if they show all.
     pub(super) fn note(&self) -> Option<String> {
         let left_out: Vec<_> = self.methods.iter().filter_map(Curve::left_out).collect();
         let densities = left_out.join("; ");
         (!left_out.is_empty())
-            .then(|| format!("left out of figure 1, because each {TOO_DENSE}: {densities}"))
+            .then(|| format!("left out of figure 1, because {TOO_DENSE}: {densities}"))
     }
 }
 

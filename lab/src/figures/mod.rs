@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::cli::FiguresArgs;
 use crate::image;
+use crate::notices::say;
 use crate::plot::{COLORS, Drawing, save, svg};
 use crate::table::Results;
 
@@ -32,9 +33,10 @@ pub fn run(args: &FiguresArgs) -> Result<()> {
 fn measure(args: &FiguresArgs) -> Result<()> {
     let folder = &args.output;
     let curves = density::Curves::measure(args)?;
+    curves.check()?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;
     if let Some(note) = curves.note() {
-        writeln!(io::stderr(), "{note}")?;
+        say(&note);
     }
     let results = Results::measure(&args.scenes, &args.race)?;
     write(&bars::Figure(&results), &results, folder, "figure2")?;

@@ -50,7 +50,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let start = Instant::now();
     let (scene, model) = Scene::open(&args.scene, args.takes_instances())?;
     let load_seconds = start.elapsed().as_secs_f64();
-    tell_hidden(&scene)?;
+    tell_hidden(&scene);
     // Only now, because a file that is no mesh has an error of its own.
     image::check_sources(&args.output, &args.scene, "picture")?;
     let facts = match &model {
@@ -305,8 +305,8 @@ mod tests {
             ("--density 8", TRIANGLE, "--density is not for bvh"),
             ("--macrocell-factor 8", TRIANGLE, "--macrocell-factor is for --method fixed"),
             ("--depth 2", TRIANGLE, "--depth is for --method recursive"),
-            ("--method fixed --macrocell-factor 1", TRIANGLE, "1 is not in 2..=4294967295"),
-            ("--method recursive --depth 5", TRIANGLE, "5 is not in 1..=4"),
+            ("--method fixed --macrocell-factor 1", TRIANGLE, "it is no whole number, 2 or more"),
+            ("--method recursive --depth 5", TRIANGLE, "it is no whole number from 1 to 4"),
             ("--method fixed --quality high", TRIANGLE, "--quality is for --method bvh"),
             ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
             ("--eye 0.5,0.5,0", TRIANGLE, "--eye is in the middle of the scene, to which it looks"),

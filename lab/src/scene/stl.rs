@@ -22,8 +22,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
     let count = count.map(|count| u32::from_le_bytes(*count) as usize);
     let rest = bytes.get(HEADER_BYTES..).unwrap_or_default();
-    // The count and the last bytes of triangles are nearly always zero somewhere, and text has no zeros.
-    let is_text = starts_with_solid(bytes) && !bytes.contains(&0);
+    // The header or the count of a binary file nearly always has a zero somewhere, and text has none.
+    let head = bytes.get(..HEADER_BYTES).unwrap_or(bytes);
+    let is_text = starts_with_solid(bytes) && !head.contains(&0);
     match count {
         Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => Ok(binary(rest)),
         // The names of solids may be in any encoding.
