@@ -206,7 +206,7 @@ pub unsafe extern "C" fn hgrid_closest_point(
 ) -> bool {
     let Some(to) = NonNull::new(closest) else { return false };
     // SAFETY: the caller's promise.
-    let Ok(Some(found)) = (unsafe { raw::closest(grid, query, options) }) else {
+    let Ok(Some(found)) = (unsafe { raw::closest_point(grid, query, options) }) else {
         return false;
     };
     // SAFETY: the caller's promise.

@@ -20,7 +20,7 @@ use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters, density_is_valid};
 use crate::control::Watch;
 use crate::error::{Error, Region};
-use crate::hash::Hash;
+use crate::fnv::Fnv;
 use crate::limits::{ALIGNMENT, MAX_RESOLUTION};
 use crate::mesh::TriangleMesh;
 use crate::method::{Content, Method, Quality, REMOVED_METHOD};
@@ -150,7 +150,7 @@ impl Header {
     fn sum(&self) -> u32 {
         let words: [u32; HEADER_BYTES / size_of::<u32>()] = transmute!(*self);
         let (_, words) = words.split_last().unwrap_or((&0, &[]));
-        let mut sum = Hash::new();
+        let mut sum = Fnv::new();
         for &word in words {
             sum.add(word);
         }

@@ -209,12 +209,12 @@ impl<'a> Grid<'a> {
         if IS_SMALL {
             return self.intersect_with(ray, &mut QueryOptions::default());
         }
-        self.closest(ray, ray.t_max)
+        self.closest_hit(ray, ray.t_max)
     }
 
     /// The closest hit of a ray, if its `t` is no more than `until`: `t_max`, or the `t` of a hit in another instance.
     #[inline(never)]
-    pub(crate) fn closest(&self, ray: &Ray, until: f32) -> Option<Hit> {
+    pub(crate) fn closest_hit(&self, ray: &Ray, until: f32) -> Option<Hit> {
         self.one(ray, until, false)
     }
 

@@ -2,8 +2,8 @@
 //! triangles.
 
 use crate::aabb::Aabb;
+use crate::fnv::Fnv;
 use crate::grid::Grid;
-use crate::hash::Hash;
 use crate::ray::INVALID_ID;
 use crate::visit::EVERYWHERE;
 
@@ -59,7 +59,7 @@ impl Grid<'_> {
             found.first_bad = found.first_bad.min(id);
         }
 
-        let mut hash = Hash::new();
+        let mut hash = Fnv::new();
         let (min, max) = self.bounds();
         hash.add(self.method() as u32);
         self.resolution().into_iter().for_each(|cells| hash.add(cells));

@@ -33,7 +33,7 @@
 //! |---|---|
 //! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
 //! | helpers | `invariant`, `budget`, `simd`, `extremes`, `tasks`; `random` for tests |
-//! | memory | `arena`, `bits`, `lists`, `hash`, `survey`, `cell`, `blob`, `bump` |
+//! | memory | `arena`, `bits`, `lists`, `fnv`, `survey`, `cell`, `blob`, `bump` |
 //! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |
 //! | receivers of a traversal: of hits, of id lists | `search`, `visit` |
@@ -107,8 +107,8 @@ mod extremes;
 mod filter;
 #[cfg(feature = "fixed")]
 mod fixed;
+mod fnv;
 mod grid;
-mod hash;
 mod inspect;
 mod invariant;
 mod limits;

@@ -45,7 +45,7 @@ impl Grid<'_> {
     ) -> Option<Hit> {
         // Save flash as `intersect` does.
         if options.are_plain() && !IS_SMALL {
-            return self.closest(ray, until);
+            return self.closest_hit(ray, until);
         }
         self.intersect_behind((place, ray), until, options, None, 1)
     }

@@ -39,7 +39,7 @@ use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
 pub(crate) use batch::{BatchArrays, RunningBatch};
 pub(crate) use parts::{join, parts_of};
-pub(crate) use query::{batch, closest, locate, query, query_all, surface};
+pub(crate) use query::{batch, closest_point, locate, query, query_all, surface};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,
     scene_batch, scene_locate, scene_normal, scene_surface, validate_scene, write_object,

@@ -196,7 +196,7 @@ pub(crate) unsafe fn query_all(
 ///
 /// # Safety
 /// The contract of [`grid`].
-pub(crate) unsafe fn closest(
+pub(crate) unsafe fn closest_point(
     view: *const hgrid_grid,
     query: *const hgrid_point_query,
     asked: *const hgrid_query_options,

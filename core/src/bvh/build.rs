@@ -7,7 +7,7 @@
 //! ```text
 //! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
-//! scatter   each triangle's entry into its bin                                  (bins.rs)
+//! scatter   each triangle's entry into its bin                                  (scatter.rs)
 //! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)
 //! top       a tree over the subtrees                                            (top.rs)
 //!
@@ -35,7 +35,6 @@ use core::ops::Range;
 use fearless_simd::Simd;
 use zerocopy::{FromZeros, IntoBytes};
 
-use super::bins::{place_tasks, scatter};
 use super::census::{Census, count};
 use super::high;
 use super::index::{clear_header, cut_index, finish, move_nodes};
@@ -46,6 +45,7 @@ use super::layout::{
 };
 use super::node::{Node, least_node};
 use super::roots::{RECORD, RootRecord, Roots};
+use super::scatter::{place_tasks, scatter};
 use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam};

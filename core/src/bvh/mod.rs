@@ -16,7 +16,7 @@
 //!
 //! ```text
 //! format         node, layout, validate
-//! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`; index
+//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top; high/ for quality `high`; index
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays, group (boxes, met, group_leaf), interleave
 //! points         nearest
@@ -36,7 +36,6 @@
 //! tree is bound to a level of the grid, and leaves hold ids, not triangles.
 
 mod batch;
-mod bins;
 mod boxes;
 mod build;
 mod census;
@@ -55,6 +54,7 @@ mod order;
 mod rays;
 mod refit;
 mod roots;
+mod scatter;
 mod search;
 mod shape_leaf;
 mod slab;

@@ -31,7 +31,7 @@ use super::boxes::{bits, splat};
 use super::node::{Child, Node, WIDTH, floats};
 use super::shape_leaf::nearest_of;
 use super::slab::{TINY, WIDER};
-use super::stack::{StackEntry, pop, waiting};
+use super::stack::{StackEntry, entry, pop};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::Eight;
@@ -220,7 +220,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                                 core::mem::swap(&mut other, &mut nearest);
                             }
                             let Some(place) = stack.get_mut(top) else { return };
-                            *place = waiting(number, other, at(other).to_bits());
+                            *place = entry(number, other, at(other).to_bits());
                             top += 1;
                         }
                         child = node.child(nearest);

@@ -80,7 +80,7 @@ impl Node {
     };
 
     /// A node that waits for its children: the range that it will hold, and the levels above it.
-    pub(crate) fn waiting(start: u32, end: u32, level: u32) -> Self {
+    pub(crate) fn unbuilt(start: u32, end: u32, level: u32) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "below 64")]
         let counts = [level as u8, 0, 0, 0, 0, 0, 0, 0];
         Self { word: WAITING, child: start, first: end, counts, ..Self::EMPTY }

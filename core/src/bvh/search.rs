@@ -116,7 +116,7 @@ impl Bvh<'_> {
         let mut stack = [0; FIRST_STACK];
         match walk_on(one, *simd, &mut stack) {
             Walked::Through => true,
-            Walked::Not => false,
+            Walked::TooFar => false,
             Walked::Full => {
                 walk_deep(one, *simd, &stack);
                 true

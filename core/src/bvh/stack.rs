@@ -38,7 +38,7 @@ pub(super) fn with_deep_stack<R>(walk: impl FnOnce(&mut [StackEntry]) -> R) -> R
 
 /// The entry of a child that is `near` away, as the bits of an f32.
 #[inline(always)]
-pub(super) fn waiting(node: u32, slot: u32, near: u32) -> StackEntry {
+pub(super) fn entry(node: u32, slot: u32, near: u32) -> StackEntry {
     u64::from(near) << 32 | u64::from(node << 3 | slot)
 }
 
@@ -53,7 +53,7 @@ pub(super) fn push(
     slot: u32,
     near: u32,
 ) {
-    let waiting = waiting(node, slot, near);
+    let waiting = entry(node, slot, near);
     let mut at = *top;
     let Some(_) = stack.get(at) else { return };
     *top += 1;

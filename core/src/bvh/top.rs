@@ -117,7 +117,7 @@ pub(crate) fn build(
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
     let item_count = items.len() as u32;
     // A node that waits keeps its range and level where its children will be.
-    let mut root = Node::waiting(0, item_count, 0);
+    let mut root = Node::unbuilt(0, item_count, 0);
     let (mut count, mut levels) = (0, 0);
     // Start with the root, which is not among `nodes`.
     for at in (0_usize..).map(|at| at.checked_sub(1)) {
@@ -141,7 +141,7 @@ pub(crate) fn build(
                     levels = levels.max(level + 1 + below);
                     node
                 }
-                _ => Node::waiting(part.start, part.end, level + 1),
+                _ => Node::unbuilt(part.start, part.end, level + 1),
             };
             *nodes.get_mut(count as usize)? = below;
             count += 1;

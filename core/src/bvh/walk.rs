@@ -80,7 +80,7 @@ pub(crate) enum Walked {
     /// The ray has passed the tree, or the search is over.
     Through,
     /// [`Slab::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed.
-    Not,
+    TooFar,
     /// The stack has no room for the children of a node. The walk may go on with a larger one.
     Full,
 }
@@ -295,7 +295,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume } = one;
         let (part, cull, afar) = (*part, *cull, *afar);
         let nearby = if afar.is_none() { Slab::nearby(ray, part, bounds) } else { afar.copied() };
-        let Some((slab, filter)) = nearby else { return Walked::Not };
+        let Some((slab, filter)) = nearby else { return Walked::TooFar };
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };

@@ -156,7 +156,7 @@ impl Kernel for Grow<'_> {
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(place as usize) {
                     Some(node) if part.count() <= self.wait => {
-                        *node = Node::waiting(start, end, below.level);
+                        *node = Node::unbuilt(start, end, below.level);
                     }
                     _ => {
                         if let Some(slot) = stack.get_mut(jobs).or_bug("too many jobs wait") {

@@ -1,9 +1,9 @@
-//! A hash of words, the same in either byte order: against accidents, not against forgery.
+//! A hash of words (FNV-1a), the same in either byte order: against accidents, not against forgery.
 
 /// FNV-1a over words instead of bytes.
-pub(crate) struct Hash(u64);
+pub(crate) struct Fnv(u64);
 
-impl Hash {
+impl Fnv {
     pub(crate) const fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
