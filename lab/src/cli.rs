@@ -125,10 +125,10 @@ fn is_bare(word: &str) -> bool {
     word.chars().all(|c| c.is_ascii_alphabetic() || c == '-') && !word.starts_with('-')
 }
 
-/// Returns the error of a word that is neither a command nor a file, with the commands.
+/// Returns the error for a word that is neither a command nor a file; it lists the commands.
 fn no_command(word: &str, nearest: Option<String>) -> clap::Error {
     let mut cli = Cli::command();
-    // Words that have little in common are told to be near, too.
+    // clap suggests words that share only a few letters, too.
     let nearest = nearest.filter(|name| name.chars().next() == word.chars().next());
     let hint = nearest.map(|name| format!(", the nearest command is `{name}`"));
     let shown = cli.get_subcommands().filter(|command| !command.is_hide_set());
@@ -341,7 +341,7 @@ pub struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// Refuses options for trees without a tree among the methods, and results in place of a mesh.
+    /// Refuses options of trees if no tree is built, and results that would overwrite a mesh.
     ///
     /// # Errors
     /// If there is one; the message names the option and its method.

@@ -96,7 +96,7 @@ pub fn make_folder(path: &Path) -> Result<()> {
 /// Makes a folder for what `work` writes at its end. If it fails, new folders that are still empty are removed.
 ///
 /// # Errors
-/// Those of [`make_folder`] and of the work.
+/// The errors of [`make_folder`] and of the work.
 pub fn in_folder<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
     let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
     let new: Vec<_> = path.ancestors().take_while(is_new).collect();

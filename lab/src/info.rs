@@ -193,7 +193,7 @@ impl MeshFacts {
         let Scene { positions, indices, .. } = scene;
         let mut flat = 0;
         for triangle in indices {
-            // Every format is read without vertices that are not there.
+            // The readers refuse indices of vertices that are not there.
             let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
             let [Some(a), Some(b), Some(c)] = corners else { continue };
             let has_area = normal_of(&[a, b, c]).is_some();

@@ -1,16 +1,16 @@
-//! Notices on standard error: what of a scene no picture shows.
+//! Notices on standard error: the parts of a scene that no picture shows.
 
 use std::io::{self, Write as _};
 
 use crate::plural::counted;
 use crate::scene::Scene;
 
-/// Tells of what the files of a scene have that is not read. Nothing is lost if nobody can read it.
+/// Names the parts of a scene's files that are not read.
 pub(crate) fn tell_hidden(scene: &Scene) {
     scene.hidden.iter().for_each(|hidden| say(hidden));
 }
 
-/// Tells of the same, and of triangles that are left out.
+/// Names the same parts, and counts the triangles that are left out.
 pub(crate) fn tell(scene: &Scene) {
     tell_hidden(scene);
     if let Some(left_out) = left_out(scene.not_finite_count()) {
@@ -18,7 +18,7 @@ pub(crate) fn tell(scene: &Scene) {
     }
 }
 
-/// Writes a line to standard error, if that takes it: a closed pipe there must not end the work.
+/// Writes a line to standard error. An error is ignored: a closed pipe there must not end the work.
 pub(crate) fn say(line: &str) {
     // Not `eprintln`, which panics if nothing can be written.
     let _ = writeln!(io::stderr(), "{line}");

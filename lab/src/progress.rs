@@ -22,7 +22,7 @@ pub struct Progress {
     bar: ProgressBar,
     scope: String,
     is_shown: bool,
-    /// The time of the last line, from the start on.
+    /// The time at which the last line was written, from the start on.
     told: Cell<Duration>,
 }
 

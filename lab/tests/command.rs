@@ -326,7 +326,7 @@ fn one_triangle_is_no_plural() {
     }
 }
 
-/// Every command that loads a mesh tells what of it is not shown.
+/// Commands that load a mesh name the parts of it that they do not show.
 #[test]
 fn what_is_left_out_is_told() {
     let folder = Folder::new("left-out").unwrap();
@@ -348,14 +348,14 @@ fn what_is_left_out_is_told() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{words}: {said}");
         assert_eq!(said.matches("eye.gltf: not shown: 1 camera\n").count(), 1, "{words}: {said}");
-        // A picture tells it with its numbers, and a description has a row.
+        // `render` prints this among its numbers, and `info` has a row for it.
         let count = usize::from(!matches!(command, "render" | "info"));
         let left_out = ": one triangle that is not finite is left out\n";
         assert_eq!(said.matches(left_out).count(), count, "{words}: {said}");
     }
 }
 
-/// Nobody has to read what is told.
+/// A command succeeds although nobody reads its notices.
 #[test]
 fn notices_that_nobody_reads_end_no_command() {
     let folder = Folder::new("unread").unwrap();
@@ -400,7 +400,7 @@ fn a_blob_can_be_an_array_of_c() {
     }
 }
 
-/// A mesh has a density beyond which a build takes fewer cells; nobody gets these in place of what was asked for.
+/// Beyond some density, a build takes fewer cells than it was asked for. The command refuses such a density.
 #[test]
 fn a_density_that_a_mesh_cannot_have_is_refused() {
     let folder = Folder::new("density").unwrap();
@@ -439,7 +439,7 @@ fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
     }
     assert!(folder.fails("figures nothing.ply -o new").unwrap().contains("cannot open it"));
     assert!(!folder.0.join("new").exists());
-    // What only the file can tell is another failure.
+    // Whether the file exists shows only when it is opened: that error has status 1.
     assert_eq!(folder.hgrid("render nothing.ply").unwrap().status.code(), Some(1));
 }
 

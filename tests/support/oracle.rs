@@ -153,7 +153,7 @@ pub fn check(grid: &Grid<'_>, ray: &Ray) -> bool {
 /// Does the same for several grids of one mesh.
 ///
 /// # Panics
-/// On the first difference, with the ray; without a grid.
+/// If an answer differs (the message has the ray), or if there is no grid.
 pub fn check_all(grids: &[Grid<'_>], ray: &Ray) -> bool {
     let first = grids.first().expect("a grid to check");
     let expected = Expected::new(first.mesh(), ray);

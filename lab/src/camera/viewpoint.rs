@@ -35,7 +35,7 @@ const OPEN_SIDE: u16 = LEVEL / 12;
 /// The view of a thing that is not flat.
 const THING: View = View::Angles { azimuth: 15.0, elevation: 12.0 };
 
-/// The view of a box, whose front would hide the other sides from the view of a thing.
+/// The view of a box. From the view of a thing, the front of a box would hide its other sides.
 const BOX: View = View::Angles { azimuth: 30.0, elevation: 25.0 };
 
 /// The places on each side of a box that are tried, as parts of its size, and the depth to which they lie on it.

@@ -134,7 +134,7 @@ fn the_help_names_limits() {
         assert!(is_value, "{words}: {error}");
         let help = of_help(said[1], said[2].trim_start_matches('-'));
         assert!(help.contains(limit), "{words}: {help}");
-        // Small numbers are below a least one, which the help tells.
+        // The small numbers are refused by the least number, the others by the greatest.
         let number: u32 = said[3].parse().unwrap();
         if number > 2 {
             let greatest = (number - 1).to_string();

@@ -1,4 +1,4 @@
-//! The values of options: parsers that say what they take to who writes something else.
+//! Parsers for the values of options. Their errors say which values an option takes.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -12,7 +12,7 @@ pub(super) fn thread_parser() -> impl TypedValueParser<Value = u32> {
     whole(1..=Control::MAX_TASKS)
 }
 
-/// Parses a whole number in a range, and names the range to who writes `1e9` or `1920x1080`.
+/// Parses a whole number in a range. The error names the range, for words like `1e9` or `1920x1080`, too.
 pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl TypedValueParser<Value = T>
 where
     T: Copy + PartialOrd + fmt::Display + TryFrom<i64> + Send + Sync + 'static,
@@ -21,7 +21,7 @@ where
         let number = word.parse::<i64>().ok().and_then(|number| T::try_from(number).ok());
         number.filter(|number| range.contains(number)).ok_or_else(|| {
             let (start, end) = (range.start(), range.end().to_string());
-            // The greatest number of 32 bits is no limit that a user has to know.
+            // Users need not know the greatest number of 32 bits.
             if end == u32::MAX.to_string() {
                 format!("it is no whole number, {start} or more")
             } else {

@@ -50,7 +50,7 @@ impl Curves {
         };
         let (scene, spec) = (Scene::load(spec)?, spec.display());
         ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
-        // Figure 2 tells of its own scenes.
+        // Figure 2 prints the notices of its own scenes.
         if args.figure1.is_some() {
             tell(&scene);
         }

@@ -80,7 +80,7 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
-/// Returns the words for what changes shapes or shows them, and is not read.
+/// Counts what the file has and this reader ignores: animations, skins, morph targets and cameras, in words.
 fn hidden(document: &Document) -> Vec<String> {
     let has_targets =
         |mesh: &gltf::Mesh<'_>| mesh.primitives().any(|part| part.morph_targets().len() > 0);
@@ -97,7 +97,7 @@ fn hidden(document: &Document) -> Vec<String> {
     .collect()
 }
 
-/// Refuses other versions of glTF than 2, whose files have the same names.
+/// Refuses versions of glTF other than 2: their files have the same endings.
 fn check_version(version: &str) -> Result<()> {
     let is_read = version == "2" || version.starts_with("2.");
     ensure!(is_read, "it is of glTF {version}, and hgrid reads glTF 2: export it as that");

@@ -44,7 +44,7 @@ pub struct Scene {
     pub of_triangles: Option<Bounds>,
     /// The axis that the file's format says is up, if it does: true for z, false for y.
     pub is_z_up: Option<bool>,
-    /// A sentence for each file that has more than is read of it.
+    /// A sentence for each file of which parts are not read.
     pub hidden: Vec<String>,
 }
 

@@ -66,7 +66,7 @@ pub struct Model {
     pub meshes: Vec<Mesh>,
     /// The index of a mesh, and its transform.
     pub instances: Vec<(usize, Transform)>,
-    /// What else the file has that is not read, in words.
+    /// The parts of the file that are not read, in words.
     pub hidden: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ impl From<Mesh> for Model {
 }
 
 impl Model {
-    /// Returns a sentence about what a file has that is not read; nothing if there is none.
+    /// Returns a sentence that names the parts of a file that are not read; nothing if there are none.
     pub(crate) fn hidden_in(&self, file: impl fmt::Display) -> Vec<String> {
         let hidden = self.hidden.join(", ");
         if hidden.is_empty() { Vec::new() } else { vec![format!("{file}: not shown: {hidden}")] }

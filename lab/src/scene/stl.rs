@@ -66,7 +66,7 @@ fn ascii(text: &str) -> Result<Mesh> {
     let mut lines = (1..).zip(text.lines()).peekable();
     while let Some((number, line)) = lines.next() {
         let result = read_line(line, &mut positions, &mut is_complete);
-        // What is wrong in the last line of a part is what is missing.
+        // An incomplete file is cut off: say that, not what its last line lacks.
         let is_end = lines.peek().is_none();
         ensure!(
             !is_end || (is_complete && positions.len().is_multiple_of(3)),
@@ -150,7 +150,7 @@ mod tests {
     fn damage_is_reported() {
         let message = |bytes: &[u8]| format!("{:#}", read(bytes).unwrap_err());
         assert!(message(&file(b"", 2)[..183]).starts_with("it is cut off after 1 of 2 triangles"));
-        // A part of a binary file is none of text, whatever its first word is.
+        // A binary file that is cut off is not text, whatever its first word is.
         assert!(message(&file(b"solid", 2)[..183]).starts_with("it is cut off after 1 of 2"));
         assert!(message(b"hello").contains("not an STL file"));
         for length in TEXT.find("facet").unwrap()..TEXT.find("endsolid").unwrap() {
