@@ -7,9 +7,8 @@
 //!
 //! The bounds of quality `fast` depend on the number `n` of triangles alone ([`high`](super::high) has its own):
 //!
-//! - A node has eight children, unless its subtree has fewer triangles (a root of a small mesh) or fewer
-//!   roots. So each node below a root replaces one range of ids by eight: (m - 1) / 7 nodes at most for
-//!   `m` triangles.
+//! - A node below a root has eight children, or none that are nodes: (m - 1) / 7 nodes at most for `m` triangles
+//!   ([`subtree`](super::subtree)).
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
 //!   1 + 4/7 = 11/7 nodes, itself included.

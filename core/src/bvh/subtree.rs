@@ -5,13 +5,19 @@
 //! note in which bit neighbours' keys differ first
 //! ranges = [all]
 //! for each range of more than a leaf, breadth first:
-//!     cut it in eight where neighbours differ in the highest bits; halve what has equal keys
+//!     cut it in eight where neighbours differ in the highest bits, but no small part; halve what has equal keys
 //!     parts of a leaf's size or less become leaves, the others nodes
 //! for each node, last first: the box of a child is the union of its triangles' boxes, or its node's box;
 //!                            quantise all eight
 //! ```
 //!
-//! A subtree with too many nodes for the memory bound is cut again, by halves only.
+//! A part is small if it has four triangles or fewer. A query reads four at once, so two leaves of two take twice as
+//! long as one of four. Small parts are cut only by the two highest bits of a range, as they may be wide there.
+//!
+//! `m` triangles have (m - 1) / 7 nodes at most. Let `a` nodes have nodes among their children, and `b` have none. The
+//! first have eight children each: all nodes but the root, and leaves of one triangle or more. The others have nine
+//! triangles or more each. So m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes
+//! for the memory bound is cut again, by halves only.
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
@@ -50,6 +56,8 @@ pub(crate) struct Subtree {
     ranges: [EntryRange; MOST_NODES],
     /// Levels above each node.
     above: [u8; MOST_NODES],
+    /// No number in `changes` inside each range is higher than this, unless it is inside a small part.
+    tops: [u8; MOST_NODES],
     count: usize,
     /// The boxes of the triangles, then those of the nodes.
     boxes: [Sides; BOXES],
@@ -70,6 +78,11 @@ pub(crate) enum Cut {
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
     Halves,
 }
+
+/// Triangles of a part that is small, at most.
+const SMALL: u8 = 4;
+/// The number of bits, from the first one that changes in a range, that also cut small parts.
+const FREE_BITS: u32 = 2;
 
 /// A range of entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,6 +147,7 @@ impl Subtree {
             children: [[EntryRange::NONE; WIDTH]; MOST_NODES],
             ranges: [EntryRange::NONE; MOST_NODES],
             above: [0; MOST_NODES],
+            tops: [0; MOST_NODES],
             count: 0,
             boxes: [[0.0; 8]; BOXES],
             sources: [0; MOST_ROOT + LEAF],
@@ -212,6 +226,7 @@ impl Subtree {
         // The numbers that occur in `changes`, as a mask.
         let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32));
         (self.count, self.id_count) = (1, 0);
+        self.tops[0] = 31;
         let mut at = 0;
         while at < self.count {
             self.cut(at, bits & !1, changes);
@@ -223,19 +238,24 @@ impl Subtree {
     #[inline(always)]
     fn cut(&mut self, at: usize, bits: u32, changes: impl Fn(u8) -> u128) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
-        let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
+        let (Some(&range), Some(&above), Some(&top)) =
+            (self.ranges.get(at), self.above.get(at), self.tops.get(at))
+        else {
             return;
         };
-        let parts = parts(range, bits, changes);
+        let (parts, top) = parts(range, bits & (u32::MAX >> (31 - top % 32)), changes);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate() {
             let count = part.count();
             if count > LEAF {
                 debug_assert!(self.count < MOST_NODES, "a subtree has too many nodes");
-                let places = (self.ranges.get_mut(self.count), self.above.get_mut(self.count));
-                if let (Some(range_of), Some(above_of)) = places {
-                    (*range_of, *above_of) = (*part, above + 1);
+                let next = self.count;
+                let places = (self.ranges.get_mut(next), self.above.get_mut(next));
+                if let ((Some(range_of), Some(above_of)), Some(top_of)) =
+                    (places, self.tops.get_mut(next))
+                {
+                    (*range_of, *above_of, *top_of) = (*part, above + 1, top);
                     node.set_inner(slot);
                     self.count += 1;
                 }
@@ -316,14 +336,15 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     [x, y, z, 0.0, u, v, w, 0.0]
 }
 
-/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where keys
-/// change in the highest bits; then the largest part is halved until there are eight.
+/// Cuts a range into eight parts, or into small ones if there are fewer, in the order of the keys: where keys change in
+/// the highest bits; then the largest part is halved until there are eight, or all are small. Also returns what
+/// [`highest`] does.
 #[inline(always)]
-fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> [EntryRange; WIDTH] {
+fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> ([EntryRange; WIDTH], u8) {
     let mut parts = [EntryRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
-    let mut cuts = highest(range, bits, changes);
+    let (mut cuts, top) = highest(range, bits, changes);
     while cuts != 0 && count < WIDTH - 1 {
         let end = cuts.trailing_zeros() as u8 + 1;
         cuts &= cuts - 1;
@@ -340,7 +361,7 @@ fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> [EntryRa
             }
         }
         let EntryRange { start, end } = parts[largest];
-        if end < start + 2 {
+        if end <= start + SMALL {
             break;
         }
         // The parts behind it make room for its second half.
@@ -353,20 +374,29 @@ fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> [EntryRa
             next = core::mem::replace(slot, next);
         }
     }
-    parts
+    (parts, top)
 }
 
-/// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer.
+/// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer, but those that would
+/// cut a small part. Also returns the lowest bit that was looked at.
 #[inline(always)]
-fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> u128 {
+fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> (u128, u8) {
     // A range of one entry or none has no inside.
-    let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else { return 0 };
-    let inside = (1_u128 << last) - (1 << range.start);
-    let (mut chosen, mut left) = (0, WIDTH as u32 - 1);
-    let mut bits = bits;
+    let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else {
+        return (0, 0);
+    };
+    let (first, last) = (1_u128 << range.start, 1_u128 << last);
+    let inside = last - first;
+    let (mut chosen, mut left, mut free) = (0, WIDTH as u32 - 1, FREE_BITS);
+    let (mut bits, mut lowest) = (bits, 0);
     while let Some(bit) = bits.checked_ilog2() {
         bits ^= 1 << bit;
-        let mut here = changes(bit as u8) & inside;
+        lowest = bit as u8;
+        let mut here = changes(lowest) & inside;
+        if free == 0 {
+            here &= !inside_small(chosen << 1 | first, chosen | last);
+        }
+        free -= u32::from(free > 0 && (chosen | here) != 0);
         if here.count_ones() >= left {
             for _ in 0..left {
                 chosen |= here & here.wrapping_neg();
@@ -377,8 +407,18 @@ fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> u128 {
         left -= here.count_ones();
         chosen |= here;
     }
-    chosen
+    (chosen, lowest)
 }
+
+/// The places inside small parts, given the first and the last entry of each part.
+#[inline(always)]
+const fn inside_small(first: u128, last: u128) -> u128 {
+    // A place is the entry before it. The part is small if its last entry is no more than three behind its first.
+    let (one, two, three) = (last >> 1, last >> 2, last >> 3);
+    first & (one | two | three) | first << 1 & (one | two) | first << 2 & one
+}
+
+const _: () = assert!(SMALL == 4);
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! stack = [all triangles]
-//! pop a range; cut it until there are eight parts (cut.rs)
+//! pop a range; cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
 //!     any other part:                         push it
@@ -20,6 +20,9 @@ use crate::bvh::layout::LEVELS;
 use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
+
+/// Triangles of a part that is not cut, at most: a query reads so many at once.
+const SMALL: u32 = 4;
 
 /// The level from which on ranges are halved.
 const HALVED_FROM: u32 = 24;
@@ -187,7 +190,7 @@ impl Kernel for Grow<'_> {
 }
 
 impl Grow<'_> {
-    /// Cuts a range into eight parts in the order of its items, or into single triangles if there are fewer.
+    /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer.
     #[inline(always)]
     fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [SubRange; WIDTH] {
         let mut parts = [SubRange::NONE; WIDTH];
@@ -240,14 +243,14 @@ fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
 }
 
 /// Chooses the part to cut next: of parts too large for a leaf the one with the largest surface, then of leaves the one
-/// with the largest surface times count; where parts are halved, the one with the most triangles. `None` if each has
-/// one.
+/// with the largest surface times count; where parts are halved, the one with the most triangles. `None` if all are
+/// small.
 #[inline(always)]
 fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;
     let mut most = (false, -1.0, 0);
     for (at, part) in parts.iter().enumerate() {
-        if part.count() < 2 {
+        if part.count() <= SMALL {
             continue;
         }
         let is_node = part.count() > LEAF as u32;
