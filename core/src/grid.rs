@@ -20,7 +20,7 @@ use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::options::{Cull, QueryOptions};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
-use crate::search::{BoxSearch, One, Outcome, Search, test_all};
+use crate::search::{BoxSearch, One, Outcome, Search, TriangleSearch, test_all};
 use crate::simd::{IS_SMALL, SimdLevel};
 use crate::structure::{self, Structure, by_kind};
 use crate::triangle::TriangleTest;
@@ -244,7 +244,16 @@ impl<'a> Grid<'a> {
     #[inline(always)]
     fn one(&self, ray: &Ray, until: f32, is_any: bool) -> Option<Hit> {
         let mut one = One { hit: Hit { t: until, ..Hit::MISS }, is_any };
-        self.search(ray, [ray.t_min, until], Cull::None, &mut one, &mut ());
+        let part = [ray.t_min, until];
+        by_kind!(
+            &self.structure,
+            tree => tree.search(&self.scope(), ray, part, Cull::None, &mut one, &mut ()),
+            {
+                // Save 10 KB: use the traversal of cells for queries with options, so that there is only that one.
+                let mut show = TriangleSearch(&mut |hit| one.show(hit));
+                self.search_cells(ray, part, Cull::None, &mut show, &mut Counters::default());
+            }
+        );
         (one.hit.primitive != INVALID_ID).then_some(one.hit)
     }
 
