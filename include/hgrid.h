@@ -255,9 +255,9 @@
 
 /**
  * Bytes of scratch that are enough with `HGRID_QUALITY_HIGH`; for the index use `HGRID_INDEX_BOUND`. With 32 bits
- * the result wraps beyond 134 million triangles.
+ * the result wraps beyond 130 million triangles.
  */
-#define HGRID_BVH_HIGH_SCRATCH_BOUND(triangles) ((size_t)32 * (triangles) + 64)
+#define HGRID_BVH_HIGH_SCRATCH_BOUND(triangles) ((size_t)33 * (triangles) + 64)
 
 /**
  * Bytes of scratch that are enough for `hgrid_validate` of a grid of so many triangles: a bit for each.
@@ -289,7 +289,7 @@
  * The version of the blob format, the same for all methods. A blob of another version is refused:
  * build it again.
  */
-#define HGRID_BLOB_VERSION 3
+#define HGRID_BLOB_VERSION 4
 
 /**
  * Indices of 32 bits: the default of `hgrid_mesh`.

@@ -24,7 +24,7 @@ pub const HGRID_ALIGNMENT: usize = 64;
 
 /// The version of the blob format, the same for all methods. A blob of another version is refused:
 /// build it again.
-pub const HGRID_BLOB_VERSION: u32 = 3;
+pub const HGRID_BLOB_VERSION: u32 = 4;
 
 /// Indices of 32 bits: the default of `hgrid_mesh`.
 pub const HGRID_INDEX_U32: u32 = 0;

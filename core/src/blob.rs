@@ -27,7 +27,7 @@ use crate::method::{Content, Method, Quality, REMOVED_METHOD};
 use crate::survey::Survey;
 
 /// The version of the blob format. A blob of another version is refused.
-pub const BLOB_VERSION: u32 = 3;
+pub const BLOB_VERSION: u32 = 4;
 
 /// Bytes before the first section.
 pub(crate) const HEADER_BYTES: usize = size_of::<Header>();
@@ -59,7 +59,7 @@ pub(crate) struct Header {
     pub(crate) bounds_max: [f32; 3],
     /// Cells per axis.
     pub(crate) resolution: [u32; 3],
-    /// Slots of the hash table.
+    /// Slots of the hash table; of a tree, nodes with fine sides.
     pub(crate) hash_count: u32,
     /// Primitive ids in all cells together, or words of the pool for a method that has one.
     pub(crate) reference_count: u32,
@@ -248,6 +248,7 @@ impl Header {
             reference_count: 0,
             content: Content::Packed as u32,
             mesh: HasMesh::Yes as u32,
+            hash_count: 0,
             node_count: 0,
             levels: 0,
             ..self

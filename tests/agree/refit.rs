@@ -5,7 +5,7 @@ use hgrid_core::{
     Method, Parameters, Quality, QueryOptions, Ray, Strided, TriangleMesh, refit,
 };
 use hgrid_tests::copy::Copy;
-use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
+use hgrid_tests::meshes::{Mesh, ball, one_triangle, room, soup};
 use hgrid_tests::methods::configs;
 use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
@@ -45,7 +45,7 @@ fn a_refitted_tree_answers_as_brute_force_and_is_valid() {
     let mut uneven = soup(300, 0.1, 3);
     uneven.append(&soup(900, 0.01, 4).scaled(1e-3));
     let mut random = Random(7);
-    for mesh in [one_triangle(), ball(8, 1.0), soup(500, 0.2, 5), uneven, Mesh::default()] {
+    for mesh in [one_triangle(), ball(8, 1.0), soup(500, 0.2, 5), uneven, room(), Mesh::default()] {
         let mut copy = tree(&mesh.view());
         let built = copy.bytes().to_vec();
         let still = refit(copy.bytes_mut(), &mesh.view()).unwrap();

@@ -4,9 +4,9 @@
 //! answers rays: it finds the boxes that a ray meets and tests their triangles with a triangle test of its
 //! own.
 
-use hgrid_core::{Block, Grid, MeshPart, Ray, TriangleMesh};
+use hgrid_core::{Block, Config, Grid, MeshPart, Ray, TriangleMesh};
 use hgrid_tests::joined::{Parts, merged};
-use hgrid_tests::meshes::{Mesh, ball};
+use hgrid_tests::meshes::{Mesh, ball, room};
 use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -33,8 +33,12 @@ impl Bytes<'_> {
         u64::from_ne_bytes(self.0[at..at + 8].try_into().unwrap())
     }
 
+    fn f32(self, at: usize) -> f64 {
+        f64::from(f32::from_bits(self.u32(at)))
+    }
+
     fn f32s(self, at: usize) -> Point {
-        [0, 4, 8].map(|axis| f64::from(f32::from_bits(self.u32(at + axis))))
+        [0, 4, 8].map(|axis| self.f32(at + axis))
     }
 
     fn u32s(self, at: usize) -> [u32; 3] {
@@ -61,7 +65,7 @@ struct Header {
 
 fn header(blob: Bytes<'_>) -> Header {
     assert_eq!(&blob.0[..8], b"hgrid\x0d\x0a\x1a");
-    assert_eq!((blob.u32(8), blob.u32(12)), (0x0102_0304, 3));
+    assert_eq!((blob.u32(8), blob.u32(12)), (0x0102_0304, 4));
     assert_eq!(blob.u32(104), 0);
     let mut h = 0xcbf2_9ce4_8422_2325_u64;
     for word in 0..31 {
@@ -103,34 +107,56 @@ impl Sections<'_> {
 }
 
 fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
-    assert_eq!((header.resolution, header.hash_count), ([1; 3], 0));
+    assert_eq!(header.resolution, [1; 3]);
     assert_eq!(header.reference_count, header.triangle_count - header.skipped_count);
     let mut sections = Sections { blob, at: 128 };
     let ids = sections.next(4 * header.reference_count);
     let nodes = sections.next(80 * header.node_count);
+    let fine = sections.next(196 * header.hash_count);
     assert_eq!(sections.at, header.blob_bytes);
 
-    let (mut leaves, mut met) = (Vec::new(), 0);
-    let mut open = vec![0];
-    while let Some(number) = open.pop() {
+    let (mut leaves, mut met, mut met_fine) = (Vec::new(), 0, 0);
+    // What a node may fill: the fine boxes above it, as leaves.
+    let everywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
+    let mut open = vec![(0, everywhere)];
+    while let Some((number, (min, max))) = open.pop() {
         let node = nodes + 80 * number;
         let (origin, word) = (blob.f32s(node), blob.u32(node + 12));
         met += 1;
         let (mut child, mut first) = (blob.u32(node + 16) as usize, blob.u32(node + 20) as usize);
+        let step = |axis: usize| 2f64.powi((word >> (8 * axis) & 0xff) as i32 - 127);
+        let sides = (first >> 31 == 1).then_some(fine + 196 * (first & 0x7fff_ffff));
+        if let Some(sides) = sides {
+            assert_eq!(blob.u32(sides + 192) as usize, number);
+            assert_eq!(blob.0[node + 24..node + 32], [0; 8]);
+            met_fine += 1;
+        }
         for s in 0..8 {
             let count = usize::from(blob.0[node + 24 + s]);
+            let (mut min, mut max) = (min, max);
+            if let Some(sides) = sides {
+                for axis in 0..3 {
+                    let at = |side: usize| blob.f32(sides + 32 * side + 4 * s);
+                    let [low, high] = [at(axis), at(axis + 3)];
+                    let none = [f64::from(f32::MAX), f64::from(f32::MIN)];
+                    assert!(word >> (24 + s) & 1 == 1 || [low, high] == none);
+                    (min[axis], max[axis]) = (min[axis].max(low), max[axis].min(high));
+                }
+            }
             if word >> (24 + s) & 1 == 1 {
                 assert_eq!(count, 0);
-                open.push(child);
+                open.push((child, (min, max)));
                 child += 1;
             } else if count > 0 {
-                let step = |axis: usize| 2f64.powi((word >> (8 * axis) & 0xff) as i32 - 127);
                 let side = |side: usize| {
                     let bound = f64::from(blob.0[node + 32 + 8 * side + s]);
                     origin[side % 3] + bound * step(side % 3)
                 };
                 let ids = (first..first + count).map(|at| blob.u32(ids + 4 * at)).collect();
-                leaves.push(Leaf { min: [0, 1, 2].map(side), max: [3, 4, 5].map(side), ids });
+                let (low, high) = ([0, 1, 2].map(side), [3, 4, 5].map(side));
+                let min = [0, 1, 2].map(|axis: usize| low[axis].max(min[axis]));
+                let max = [0, 1, 2].map(|axis: usize| high[axis].min(max[axis]));
+                leaves.push(Leaf { min, max, ids });
                 first += count;
             } else {
                 let bounds = [0, 1, 2, 3, 4, 5].map(|side| blob.0[node + 32 + 8 * side + s]);
@@ -138,7 +164,7 @@ fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
             }
         }
     }
-    assert_eq!(met, header.node_count);
+    assert_eq!((met, met_fine), (header.node_count, header.hash_count));
     let sum: usize = leaves.iter().map(|leaf| leaf.ids.len()).sum();
     assert_eq!(sum, header.reference_count);
     leaves
@@ -423,6 +449,13 @@ fn the_page_is_enough_to_read_a_blob() {
             check(&mesh, &owned.open(&view).unwrap());
         }
     }
+    // Nodes with fine sides.
+    let (room, config) = (room(), Config::default());
+    let view = room.view();
+    let owned = Owned::build(&view, &config).unwrap();
+    let grid = owned.open(&view).unwrap();
+    assert!(header(Bytes(grid.blob())).hash_count > 1);
+    check(&room, &grid);
     // Several meshes joined as one, some of them with masks.
     let meshes = [ball(6, 0.5), ball(9, 1.0).scaled(0.3), ball(4, 0.2).scaled(0.6)];
     let kept = Parts::of(&meshes);

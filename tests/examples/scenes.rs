@@ -24,7 +24,7 @@ fn draw(name: &str, sources: &[&str], dir: &Path) -> (String, Vec<u8>) {
 fn spheres_are_drawn() {
     let dir = TempDir::new().expect("a folder");
     let (printed, picture) = draw("spheres", &["spheres.c", "memory.c", "picture.c"], dir.path());
-    assert!(printed.starts_with("4000 spheres in 39360 bytes, wrote "), "{printed}");
+    assert!(printed.starts_with("4000 spheres in 39296 bytes, wrote "), "{printed}");
     assert_eq!(hash(&picture), SPHERES, "the picture has changed");
 }
 

@@ -89,6 +89,25 @@ pub fn ball(cells: u32, roundness: f32) -> Mesh {
     mesh
 }
 
+/// Returns a small ball of many triangles above a floor and between two walls, which are flat: nodes of a tree over them
+/// have fine sides.
+pub fn room() -> Mesh {
+    let mut mesh = ball(24, 1.0).scaled(0.02);
+    let at = |i: u32| i as f32 / 6.0 - 1.0;
+    for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
+        for [a, b] in [[0, 1], [1, 2], [2, 0]] {
+            let corner = |u: u32, v: u32| {
+                let mut p = [-1.0; 3];
+                (p[a], p[b]) = (at(i + u), at(j + v));
+                p
+            };
+            mesh.push([corner(0, 0), corner(1, 0), corner(1, 1)]);
+            mesh.push([corner(0, 0), corner(1, 1), corner(0, 1)]);
+        }
+    }
+    mesh
+}
+
 /// Returns triangles of about `size` anywhere in the cube from -1 to 1.
 pub fn soup(count: usize, size: f32, seed: u64) -> Mesh {
     let mut random = Random(seed);

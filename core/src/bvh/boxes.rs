@@ -23,6 +23,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
+use super::Bvh;
 use super::node::{Node, WIDTH, floats};
 use super::shape_leaf::boxes_of_leaf;
 use super::slab::WIDER;
@@ -73,15 +74,29 @@ pub(crate) struct BeamMet<S: Simd> {
 impl<S: Simd> WideBoxes<f32x8<S>> {
     /// The eight boxes of a node relative to a point, grown on each side.
     #[inline(always)]
-    pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
+    pub(crate) fn decode(
+        simd: S,
+        bvh: &Bvh<'_>,
+        node: &Node,
+        center: [f32; 3],
+        growth: f32,
+    ) -> Self {
+        let growth = f32x8::splat(simd, growth);
+        let mut boxes = Self { low: [growth; 3], high: [growth; 3] };
+        if let Some(fine) = bvh.fine_sides(node) {
+            for axis in 0..3 {
+                let center = f32x8::splat(simd, center[axis]);
+                boxes.low[axis] = fine.side(simd, axis) - center - growth;
+                boxes.high[axis] = fine.side(simd, axis + 3) - center + growth;
+            }
+            return boxes;
+        }
         let (origin, steps) = (node.origin(), node.wide_steps(simd));
         // Turn the bytes of both sides of an axis into numbers.
-        let growth = f32x8::splat(simd, growth);
         let [a, b, c, d, e, f] = node.bounds;
         let (rows, others, last) = (floats(simd, a, d), floats(simd, b, e), floats(simd, c, f));
         let rows = [rows, others, last];
         // Scale them, and move them to the origin of the group.
-        let mut boxes = Self { low: [growth; 3], high: [growth; 3] };
         for axis in 0..3 {
             let base = f32x8::splat(simd, origin[axis] - center[axis]);
             boxes.low[axis] = rows[axis].0 * steps[axis] + base - growth;

@@ -12,7 +12,8 @@
 //! top       a tree over the subtrees                                            (top.rs)
 //!
 //! index   | header | ids (first the keys, then centres) | nodes: root | subtrees of all tasks (first centres) | top |
-//! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
+//!         | fine sides |
+//! scratch | counts of tasks, sizes of bins | entries (then records of roots, items, fine sides) | spare |
 //! ```
 //!
 //! `spare` is the second buffer when a bin is sorted. While a crowded bin is divided, its centres lie in the index;
@@ -36,8 +37,9 @@ use fearless_simd::Simd;
 use zerocopy::{FromZeros, IntoBytes};
 
 use super::census::{Census, count};
+use super::fine::{FineList, FineSides, most_fine};
 use super::high;
-use super::index::{clear_header, cut_index, finish, move_nodes};
+use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
@@ -78,7 +80,8 @@ pub(super) const fn bytes(triangles: u32, quality: Quality, tasks: u32) -> (u64,
 const fn fast_bound(triangles: u32, tasks: u32) -> (u64, u64) {
     let triangles = triangles as u64;
     let tasks = if tasks < 1 { 1 } else { tasks } as u64;
-    (index_bytes(triangles, most_nodes(triangles)), scratch_bytes(triangles, tasks, triangles))
+    let index = index_bytes(triangles, most_nodes(triangles), most_fine(triangles));
+    (index, scratch_bytes(triangles, tasks, triangles))
 }
 
 /// The memory that a mesh needs: exact for one task if the scratch is large enough for any mesh.
@@ -228,8 +231,8 @@ fn build_in(
     // Build the tree on top of them.
     watch.at(TOP)?;
     let tree = work.top(entries, spare, nodes, &roots);
-    let (node_count, levels) = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
-    finish(mesh, Quality::Fast, bounds, index, finite, node_count, levels)
+    let contents = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
+    finish(mesh, Quality::Fast, bounds, index, finite, contents)
 }
 
 /// Finds the key of every triangle. Each task counts its triangles of each bin.
@@ -463,21 +466,21 @@ impl BuildInputs<'_> {
     }
 
     /// Builds the tree over the roots, behind their nodes, or in `spare` if the index has no room;
-    /// returns how many nodes and levels there are then, or `None` if nothing has room.
-    fn top(
+    /// returns what there is then, or `None` if nothing has room.
+    fn top<'e>(
         &self,
-        entries: &mut [Entry],
+        entries: &'e mut [Entry],
         spare: &mut [Entry],
         nodes: &mut [Node],
         all: &TaskTotals,
-    ) -> Option<(u32, u32)> {
+    ) -> Option<Contents<'e>> {
         // A single root is the whole tree.
         if all.roots < 2 {
             // Empty `nodes` are legal: nodes are only counted then.
             if let Some(root) = nodes.first_mut() {
                 *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
             }
-            return Some((all.nodes, all.last.levels.max(1)));
+            return Some(Contents { nodes: all.nodes, levels: all.last.levels.max(1), fine: &[] });
         }
         let roots = all.roots as usize;
         debug_assert!(
@@ -486,7 +489,11 @@ impl BuildInputs<'_> {
         );
         let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
         let records = &*whole::<RootRecord>(records.as_mut_bytes());
-        let items = whole::<RootItem>(rest.get_mut(..roots * ITEM)?.as_mut_bytes());
+        let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
+        let items = whole::<RootItem>(items.as_mut_bytes());
+        let mut room = whole::<FineSides>(rest.as_mut_bytes());
+        let most = most_fine(self.mesh.triangle_count().into());
+        let mut fine = FineList::new(take_up_to(&mut room, most as usize));
         let record = |at: u32| {
             let record = records.get(at as usize).or_bug("an item without a record");
             record.map_or((Node::EMPTY, 0), |r| (r.node, r.levels))
@@ -496,7 +503,7 @@ impl BuildInputs<'_> {
                 let RootRecord { min, max, count, .. } = *record;
                 *item = RootItem { min, max, count, record: at };
             }
-            top::build(items, record, nodes, all.nodes, self.least)
+            top::build(items, record, nodes, all.nodes, self.least, &mut fine)
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
         let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;
@@ -504,7 +511,7 @@ impl BuildInputs<'_> {
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
-        Some((all.nodes + count, levels))
+        Some(Contents { nodes: all.nodes + count, levels, fine: fine.finish() })
     }
 }
 

@@ -179,7 +179,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
-                    let boxes = WideBoxes::decode(simd, node, rays.center, rays.growth);
+                    let boxes = WideBoxes::decode(simd, bvh, node, rays.center, rays.growth);
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
                     met.meet(simd, &boxes, rays, &beam, mask, node.used(), !L::IS_ANY);
@@ -288,7 +288,7 @@ mod tests {
             (nodes.len(), 3.5, true),
             (nodes.len(), 0.25, false),
         ] {
-            let bvh = Bvh { nodes: &nodes[..count], ids: &[], levels: 1 };
+            let bvh = Bvh { nodes: &nodes[..count], fine: &[], ids: &[], levels: 1 };
             let mut rays = Rays::new(Choice::ALL);
             assert_eq!(dispatch(SimdLevel::detect(), Prepared(&mut rays, apart)), 0);
             assert_eq!(rays.alive, u64::MAX);

@@ -1,7 +1,7 @@
 //! The index while a tree is built: cut into ids and nodes, filled from the front, closed by its header.
 //!
 //! ```text
-//! | header | ids | nodes: root | nodes in the order in which they are made | zeros |
+//! | header | ids | nodes: root | nodes in the order in which they are made | fine sides | zeros |
 //! ```
 //!
 //! Both builders use it, that of `fast` and that of `high`. A build without an index only counts what it would write.
@@ -13,6 +13,9 @@
 
 use core::ops::Range;
 
+use zerocopy::IntoBytes;
+
+use super::fine::FineSides;
 use super::layout::index_bytes;
 use super::node::Node;
 use crate::aabb::Aabb;
@@ -56,30 +59,43 @@ pub(super) fn move_nodes(nodes: &mut [Node], from: Range<u32>, to: u32) {
     }
 }
 
-/// Ends a build: checks that the index, if there is one, holds the tree, puts zeros behind it and returns its header.
+/// The nodes that a build has written, their levels, and the fine sides that it has yet to write.
+#[derive(Clone, Copy)]
+pub(super) struct Contents<'f> {
+    pub(super) nodes: u32,
+    pub(super) levels: u32,
+    pub(super) fine: &'f [FineSides],
+}
+
+/// Ends a build: writes the fine sides to the index, if there is one and it holds the tree, and returns the header.
 pub(super) fn finish(
     mesh: &TriangleMesh<'_>,
     quality: Quality,
     bounds: Aabb,
     index: Option<&mut [u8]>,
     finite: u32,
-    node_count: u32,
-    levels: u32,
+    contents: Contents<'_>,
 ) -> Result<Header, Error> {
-    let needed_bytes = index_bytes(finite.into(), node_count.into());
+    let Contents { nodes, levels, fine } = contents;
+    let needed_bytes = index_bytes(finite.into(), nodes.into(), fine.len() as u64);
     if let Some(index) = index {
         let blob = first_mut(index, needed_bytes, Region::Index)?;
         let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
-        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        if let Some(padding) = blob.get_mut(used..).or_bug("nodes behind the end of the index") {
-            padding.fill(0);
+        let used = HEADER_BYTES + ids_bytes + nodes as usize * size_of::<Node>();
+        if let Some(behind) = blob.get_mut(used..).or_bug("nodes behind the end of the index") {
+            behind.fill(0);
+        }
+        let at = HEADER_BYTES + ids_bytes + section_bytes::<Node>(nodes.into()) as usize;
+        for (slot, byte) in blob.get_mut(at..).into_iter().flatten().zip(fine.as_bytes()) {
+            *slot = *byte;
         }
     }
     let lattice = Lattice::new(bounds, [1; 3]);
     let mut header = Header::new(Parameters::Bvh { quality }, mesh, &lattice);
     header.skipped_count = mesh.triangle_count() - finite;
     header.reference_count = finite;
-    header.node_count = node_count;
+    header.node_count = nodes;
+    header.hash_count = fine.len() as u32;
     header.levels = levels;
     header.blob_bytes = needed_bytes;
     Ok(header)

@@ -135,7 +135,7 @@ fn enter_node<S: Simd>(
     number: u32,
 ) -> Option<Child> {
     let node = bvh.nodes.get(number as usize)?;
-    let boxes = WideBoxes::decode(simd, node, rays.center, rays.growth);
+    let boxes = WideBoxes::decode(simd, bvh, node, rays.center, rays.growth);
     let (near, met) = boxes.meet(simd, &rays.slab(simd, one.ray));
     let near: [f32; WIDTH] = near.into();
     let near = |slot: u32| near[slot as usize % WIDTH];

@@ -1,7 +1,7 @@
 //! The memory that a tree takes, and the place of everything in it.
 //!
 //! ```text
-//! index    | header 128 B | ids: u32 a triangle | nodes: 80 B each                        |
+//! index    | header 128 B | ids: u32 a triangle | nodes: 80 B each | fine sides: 196 B each |
 //! scratch  | counts of the bins, for each task  | entries: 8 B a triangle | spare: 8 B a triangle |
 //! ```
 //!
@@ -28,10 +28,12 @@
 //!
 //! ```text
 //! late roots <= 5 n / 4097 + 1                      behind crowded bins, see above
-//! nodes      <= 0.1475 n + 1 + 11 late / 7 + 3      1 as the first term is rounded up; 3 with the root of all
-//! index       = 128 + 4 n + 80 nodes, and paddings of at most 60 and 48
-//!            <= 15.8 n + 636                        n < 4097: one late root, for which 11 / 7 is rounded down to 1
-//!            <= 15.96 n + 682 <= 16 n + 640         otherwise
+//! nodes      <= 0.14625 n + 1 + 11 late / 7 + 3     1 as the first term is rounded up; 3 with the root of all
+//! fine       <= n / 2048                             none below 2048 triangles
+//! index       = 128 + 4 n + 80 nodes + 196 fine, and paddings of at most 60, 48 and 60
+//!            <= 15.7 n + 636                        n < 2048: one late root, for which 11 / 7 is rounded down to 1
+//!            <= 15.8 n + 696 <= 16 n + 640          n < 4097: the same
+//!            <= 15.96 n + 742 <= 16 n + 640         otherwise
 //! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 60; one bin, or 16 triangles or more a bin
 //!            <= 16.5 n + 248
 //! ```
@@ -39,6 +41,7 @@
 use crate::arena::section_bytes;
 use crate::blob::HEADER_BYTES;
 
+use super::fine::FineSides;
 use super::node::Node;
 
 /// Levels of nodes, at most. Quality `fast` makes up to 49: 20 by SAH and 9 that halve roots ([`top`](super::top)), and
@@ -57,9 +60,10 @@ pub(crate) const LEAST_PIECE: usize = 32;
 
 const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
 
-/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost: 0.1475, or
-/// 11.8 bytes. With 4 bytes of ids and 0.16 of late roots an index takes less than 16 bytes a triangle.
-const NODES_PER_TRIANGLE: u64 = 24_780;
+/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost: 0.14625, or
+/// 11.7 bytes. With 4 bytes of ids, 0.16 of late roots and 0.1 of fine sides an index takes less than 16 bytes a
+/// triangle.
+const NODES_PER_TRIANGLE: u64 = 24_570;
 /// A multiple of 7 * 24, so that 11/7 nodes for 24 triangles are a whole number of parts.
 const WHOLE: u64 = 168_000;
 
@@ -116,9 +120,12 @@ pub(crate) const fn most_nodes(triangles: u64) -> u64 {
     (triangles * NODES_PER_TRIANGLE).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
 }
 
-/// Bytes of an index with so many ids and nodes.
-pub(crate) const fn index_bytes(ids: u64, nodes: u64) -> u64 {
-    HEADER_BYTES as u64 + section_bytes::<u32>(ids) + section_bytes::<Node>(nodes)
+/// Bytes of an index with so many ids, nodes and fine sides.
+pub(crate) const fn index_bytes(ids: u64, nodes: u64, fine: u64) -> u64 {
+    HEADER_BYTES as u64
+        + section_bytes::<u32>(ids)
+        + section_bytes::<Node>(nodes)
+        + section_bytes::<FineSides>(fine)
 }
 
 /// Bytes of the counts of all bins for so many tasks.

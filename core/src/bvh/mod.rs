@@ -3,10 +3,11 @@
 //! Quality `fast` builds it from a grid of the triangles' centres, quality `high` by SAH over single triangles
 //! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get a finer grid of their
 //! own. Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes
-//! of up to eight children in eight bits a side, a leaf up to eight ids; triangles stay in the caller's mesh.
+//! of up to eight children in eight bits a side, those of thin children also as f32 ([`fine`]); a leaf keeps up to
+//! eight ids. Triangles stay in the caller's mesh.
 //!
 //! ```text
-//! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side |
+//! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side | fine sides |
 //! ```
 //!
 //! Each triangle stands in one leaf. So index and scratch are bounded by the number of triangles alone,
@@ -15,8 +16,8 @@
 //! The modules:
 //!
 //! ```text
-//! format         node, layout, validate
-//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top; high/ for quality `high`; index
+//! format         node, fine, layout, validate
+//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays, group (boxes, met, group_leaf), interleave
 //! points         nearest
@@ -40,6 +41,7 @@ mod boxes;
 mod build;
 mod census;
 mod crowd;
+mod fine;
 mod group;
 mod group_leaf;
 mod high;
@@ -75,6 +77,7 @@ use crate::simd::prefetch;
 use crate::visit::Visitor;
 pub(crate) use batch::Groups;
 pub(crate) use build::{bound, build, sizes};
+use fine::{FineSides, HAS_FINE};
 pub(crate) use group::{Group, Together};
 pub(crate) use layout::LEVELS;
 use node::{LEAF, Node};
@@ -95,6 +98,7 @@ pub(crate) fn scratch_bytes(header: &Header) -> u64 {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bvh<'a> {
     nodes: &'a [Node],
+    fine: &'a [FineSides],
     ids: &'a [u32],
     /// Levels of nodes.
     levels: u32,
@@ -103,20 +107,21 @@ pub(crate) struct Bvh<'a> {
 impl<'a> Bvh<'a> {
     /// A tree without nodes: nothing is hit.
     #[cfg(feature = "alloc")]
-    pub(crate) const NOTHING: Self = Self { nodes: &[], ids: &[], levels: 0 };
+    pub(crate) const NOTHING: Self = Self { nodes: &[], fine: &[], ids: &[], levels: 0 };
 
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
     pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
         let sections = blob.get(HEADER_BYTES..).and_then(|behind| {
             let (ids, behind) = split::<u32>(behind, header.reference_count.into())?;
-            Some((ids, split::<Node>(behind, header.node_count.into())?))
+            let (nodes, behind) = split::<Node>(behind, header.node_count.into())?;
+            Some((ids, nodes, split::<FineSides>(behind, header.hash_count.into())?))
         });
-        let (ids, (nodes, rest)) =
+        let (ids, nodes, (fine, rest)) =
             sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
         if !rest.is_empty() {
             return Err(corrupt(core::mem::offset_of!(Header, blob_bytes)));
         }
-        Ok(Self { nodes, ids, levels: header.levels.min(LEVELS) })
+        Ok(Self { nodes, fine, ids, levels: header.levels.min(LEVELS) })
     }
 
     /// Lends a stack for a point, or for a ray that has filled its first one. Most trees are shallow and get a small
@@ -185,6 +190,13 @@ impl<'a> Bvh<'a> {
     fn lanes(&self, first: u32, ids: &[u32]) -> [u32; LEAF] {
         let eight = || self.ids.get(first as usize..)?.first_chunk().copied();
         eight().unwrap_or_else(|| first_eight(ids))
+    }
+
+    /// The fine sides of a node, if it has some.
+    #[inline(always)]
+    fn fine_sides(&self, node: &Node) -> Option<&'a FineSides> {
+        // Without the bit, the number is 2^31 or more, which no list has.
+        self.fine.get((node.first ^ HAS_FINE) as usize)
     }
 
     /// Passes all leaves to a visitor; `false` if its budget is used up.

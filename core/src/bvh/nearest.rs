@@ -13,10 +13,10 @@
 //!
 //! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the tree's box is one to
 //!   two away. No square overflows, and what underflows in one is below [`TINY`].
-//! - **Boxes.** A side relative to the point has two roundings. Where the node lies within 2^9 steps of the
-//!   point, they are below 2^-13 steps, which the margin of quantised boxes absorbs
-//!   ([`node`](super::node)). Elsewhere terms lose no more than a bit by cancelling: 3 * 2^-24 of the side,
-//!   9 * 2^-24 of the squared distance.
+//! - **Boxes.** A side relative to the point has two roundings. Where the node lies within 2^9 steps of the point, they
+//!   are below 2^-13 steps, which the margin of quantised boxes absorbs ([`node`](super::node)). Sides that are not
+//!   quantised ([`fine`](super::fine)) have one rounding. Elsewhere terms lose no more than a bit by cancelling: 3 *
+//!   2^-24 of the side, 9 * 2^-24 of the squared distance.
 //! - **Triangles.** A scalar product of corners with a direction has four roundings a term ([`DOTS`] is
 //!   twice that), and what is computed from it has eight.
 //! - **Reach.** Five roundings: with those above they are below 2^-20 ([`WIDER`]).
@@ -98,12 +98,20 @@ impl Point {
 
 /// The squared distances from the point to the boxes of a node.
 #[inline(always)]
-fn boxes<S: Simd>(simd: S, node: &Node, point: &Point) -> f32x8<S> {
-    let (origin, steps) = (node.origin(), node.wide_steps(simd));
+fn boxes<S: Simd>(simd: S, bvh: &Bvh<'_>, node: &Node, point: &Point) -> f32x8<S> {
     let scale = f32x8::splat(simd, point.scale);
+    let mut away = [scale; 3];
+    if let Some(fine) = bvh.fine_sides(node) {
+        for (axis, away) in away.iter_mut().enumerate() {
+            let at = f32x8::splat(simd, point.at[axis]);
+            let (low, high) = (fine.side(simd, axis), fine.side(simd, axis + 3));
+            *away = outside(simd, low * scale - at, high * scale - at);
+        }
+        return dot(away, away);
+    }
+    let (origin, steps) = (node.origin(), node.wide_steps(simd));
     let [a, b, c, d, e, f] = node.bounds;
     let rows = [floats(simd, a, d), floats(simd, b, e), floats(simd, c, f)];
-    let mut away = [scale; 3];
     for axis in 0..3 {
         let step = steps[axis] * scale;
         let base = f32x8::splat(simd, origin[axis] * point.scale - point.at[axis]);
@@ -203,7 +211,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                 Child::Inner(number) => {
                     tally.grid_step();
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
-                    let away = boxes(simd, node, &point);
+                    let away = boxes(simd, bvh, node, &point);
                     let beyond = away.simd_gt(f32x8::splat(simd, reach));
                     let mut rest = !bits(beyond) & node.used();
                     if rest != 0 {

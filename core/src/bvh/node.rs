@@ -44,7 +44,8 @@ pub(crate) struct Node {
     pub(crate) word: u32,
     /// The first child node; the others follow it.
     pub(crate) child: u32,
-    /// Place of the first id of the first leaf; those of the others follow.
+    /// Place of the first id of the first leaf; those of the others follow. In a node that has [fine
+    /// sides](super::fine), which of them are its own.
     pub(crate) first: u32,
     /// Number of ids of each leaf.
     pub(crate) counts: [u8; WIDTH],

@@ -18,6 +18,7 @@ use fearless_simd::{Simd, f32x4, f32x8};
 use glam::Vec3A;
 
 use super::Bvh;
+use super::fine::{ExactBox, FineSides, HAS_FINE};
 use super::layout::LEVELS;
 use super::node::{Child, LEAF, Node, Sides, WIDTH, floats, least_node};
 use super::stack::FEW_LEVELS;
@@ -46,10 +47,11 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     let bounds = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
     let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
         let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
-        Some((&*ids, split_mut::<Node>(behind, header.node_count.into())?.0))
+        let (nodes, behind) = split_mut::<Node>(behind, header.node_count.into())?;
+        Some((&*ids, nodes, split_mut::<FineSides>(behind, header.hash_count.into())?.0))
     });
-    let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-    let mut tree = Tree { mesh, ids, nodes, least: least_node(&bounds) };
+    let (ids, nodes, fine) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+    let mut tree = Tree { mesh, ids, nodes, fine, least: least_node(&bounds) };
     let mut refitted = tree.refit(level, levels);
     let bounds = Lattice::pad(&refitted.bounds);
     // Vertices that no triangle uses count for nothing in a build. If they made a step larger, start anew.
@@ -113,6 +115,10 @@ impl Kernel for CheckNodes<'_> {
                 *path.get_mut(depth).ok_or(bvh.wrong_node(number))? = (number, node.inner());
                 depth += 1;
                 deepest = deepest.max(depth);
+                let fine = bvh.fine_sides(node);
+                if node.has_fine_sides() && !fine.is_some_and(|fine| fine.are_of(number, node)) {
+                    return Err(bvh.wrong_node(number));
+                }
                 cost.add(simd, node, number == 0);
             }
             let above = depth.checked_sub(1).and_then(|above| path.get_mut(above));
@@ -141,6 +147,7 @@ struct Tree<'b> {
     mesh: &'b TriangleMesh<'b>,
     ids: &'b [u32],
     nodes: &'b mut [Node],
+    fine: &'b mut [FineSides],
     /// No step of a node is smaller than that of a box of this size.
     least: f32,
 }
@@ -177,8 +184,8 @@ struct RefitNode {
     rest: u8,
     /// The child node that is about to get its box.
     slot: u8,
-    /// The boxes of child nodes: min, and max with other signs.
-    boxes: [[f32; 6]; WIDTH],
+    /// The boxes of child nodes.
+    boxes: [ExactBox; WIDTH],
 }
 
 impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
@@ -186,7 +193,7 @@ impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Self(Tree { mesh, ids, nodes, least }) = self;
+        let Self(Tree { mesh, ids, nodes, fine, least }) = self;
         let least = *least;
         let mut near = mesh.part_around(ids.first().copied().unwrap_or(0));
         let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [[0.0; 6]; WIDTH] }; N];
@@ -248,6 +255,13 @@ impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
             }
             cost.add(simd, node, level.number == 0);
             thinnest = lesser(thinnest, lesser(-(x + u), lesser(-(y + v), -(z + w))));
+            if let Some(sides) = fine.get_mut((node.first ^ HAS_FINE) as usize) {
+                for (slot, exact) in level.boxes.iter().enumerate() {
+                    if node.inner() >> slot & 1 == 1 {
+                        sides.set(node, slot, exact);
+                    }
+                }
+            }
             let Some(above) = depth.checked_sub(1) else {
                 let bounds = Aabb { min: Vec3A::new(x, y, z), max: -Vec3A::new(u, v, w) };
                 return Refitted { bounds, cost: cost.total(), thinnest };

@@ -13,9 +13,10 @@
 //! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by
 //!   2^-38 of the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the tree's extent. The
 //!   relative margin covers the first; [`growth_of_range`] adds twice the second.
-//! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the tree's extent and its margin
-//!   is 2^-7 of a step, so a ray inside one leaves it behind the tree's box, and one outside never enters. Products
-//!   stay finite as long as the tree's extent is below 2^50; beyond, a NaN counts as a box that is met.
+//! - **Zero directions.** Their inverse is [`STEEP`]: no step is below 2^-60 of the tree's extent and the margin of a
+//!   box is 2^-11 of a step or more ([`fine`](super::fine)), so a ray inside one leaves it eight extents away, behind
+//!   the tree's box, and one outside never enters. Products stay finite as long as the tree's extent is below 2^50;
+//!   beyond, a NaN counts as a box that is met.
 //! - **Far origins.** The ray starts at a point near the tree ([`Approach`]), which may be off the ray by
 //!   `slack`; near sides are that much nearer, far sides farther.
 //!

@@ -38,8 +38,8 @@ use crate::simd::Kernel;
 use super::layout::{Entry, MOST_ROOT, most_of_root};
 use super::node::{LEAF, Node, Sides, WIDTH};
 
-/// Nodes of a subtree, at most.
-const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 2;
+/// Nodes of a subtree, at most; one to spare.
+const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
 
 /// The boxes of nodes lie behind those of triangles in [`Subtree::boxes`].
 const OF_NODES: usize = MOST_ROOT;
@@ -68,6 +68,8 @@ pub(crate) struct Subtree {
     id_count: usize,
     /// One more than the highest bit in which the keys of entries `i` and `i + 1` differ, or 0.
     changes: [u8; MOST_ROOT],
+    /// The places of each number in `changes`, as bits; only those of numbers that occur are up to date.
+    places: [u128; 32],
 }
 
 /// The rule by which ranges are cut.
@@ -154,6 +156,7 @@ impl Subtree {
             ids: [0; MOST_ROOT + LEAF],
             id_count: 0,
             changes: [0; MOST_ROOT],
+            places: [0; 32],
         }
     }
 
@@ -218,32 +221,35 @@ impl Subtree {
         }
         let [low, high]: [[u8; 64]; 2] = transmute!(self.changes);
         let [low, high] = [u8x64::simd_from(simd, low), u8x64::simd_from(simd, high)];
-        let changes = |bit: u8| {
-            let bit = u8x64::splat(simd, bit);
-            let [low, high] = [low.simd_eq(bit).to_bitmask(), high.simd_eq(bit).to_bitmask()];
-            u128::from(low) | u128::from(high) << 64
-        };
         // The numbers that occur in `changes`, as a mask.
-        let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32));
+        let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32)) & !1;
+        let mut rest = bits;
+        while rest != 0 {
+            let bit = rest.trailing_zeros();
+            rest &= rest - 1;
+            let number = u8x64::splat(simd, bit as u8);
+            let [low, high] = [low.simd_eq(number), high.simd_eq(number)].map(SimdMask::to_bitmask);
+            self.places[bit as usize % 32] = u128::from(low) | u128::from(high) << 64;
+        }
         (self.count, self.id_count) = (1, 0);
         self.tops[0] = 31;
         let mut at = 0;
         while at < self.count {
-            self.cut(at, bits & !1, changes);
+            self.cut(at, bits);
             at += 1;
         }
     }
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for each other.
     #[inline(always)]
-    fn cut(&mut self, at: usize, bits: u32, changes: impl Fn(u8) -> u128) {
+    fn cut(&mut self, at: usize, bits: u32) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(&range), Some(&above), Some(&top)) =
             (self.ranges.get(at), self.above.get(at), self.tops.get(at))
         else {
             return;
         };
-        let (parts, top) = parts(range, bits & (u32::MAX >> (31 - top % 32)), changes);
+        let (parts, top) = parts(range, bits & (u32::MAX >> (31 - top % 32)), &self.places);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate() {
@@ -340,11 +346,11 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
 /// the highest bits; then the largest part is halved until there are eight, or all are small. Also returns what
 /// [`highest`] does.
 #[inline(always)]
-fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> ([EntryRange; WIDTH], u8) {
+fn parts(range: EntryRange, bits: u32, places: &[u128; 32]) -> ([EntryRange; WIDTH], u8) {
     let mut parts = [EntryRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
-    let (mut cuts, top) = highest(range, bits, changes);
+    let (mut cuts, top) = highest(range, bits, places);
     while cuts != 0 && count < WIDTH - 1 {
         let end = cuts.trailing_zeros() as u8 + 1;
         cuts &= cuts - 1;
@@ -380,7 +386,7 @@ fn parts(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> ([EntryR
 /// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer, but those that would
 /// cut a small part. Also returns the lowest bit that was looked at.
 #[inline(always)]
-fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> (u128, u8) {
+fn highest(range: EntryRange, bits: u32, places: &[u128; 32]) -> (u128, u8) {
     // A range of one entry or none has no inside.
     let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else {
         return (0, 0);
@@ -392,10 +398,14 @@ fn highest(range: EntryRange, bits: u32, changes: impl Fn(u8) -> u128) -> (u128,
     while let Some(bit) = bits.checked_ilog2() {
         bits ^= 1 << bit;
         lowest = bit as u8;
-        let mut here = changes(lowest) & inside;
+        let mut open = inside & !chosen;
         if free == 0 {
-            here &= !inside_small(chosen << 1 | first, chosen | last);
+            open &= !inside_small(chosen << 1 | first, chosen | last);
+            if open == 0 {
+                break;
+            }
         }
+        let mut here = places[bit as usize % 32] & open;
         free -= u32::from(free > 0 && (chosen | here) != 0);
         if here.count_ones() >= left {
             for _ in 0..left {

@@ -15,6 +15,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 use crate::aabb::Aabb;
 use crate::invariant::OrBug;
 
+use super::fine::FineList;
 use super::layout::Entry;
 use super::node::{Node, WIDTH};
 
@@ -113,9 +114,11 @@ pub(crate) fn build(
     nodes: &mut [Node],
     child: u32,
     least: f32,
+    fine: &mut FineList<'_>,
 ) -> Option<Top> {
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
     let item_count = items.len() as u32;
+    fine.clear();
     // A node that waits keeps its range and level where its children will be.
     let mut root = Node::unbuilt(0, item_count, 0);
     let (mut count, mut levels) = (0, 0);
@@ -147,6 +150,9 @@ pub(crate) fn build(
             count += 1;
         }
         node.set_boxes(&bounds, &boxes, least);
+        #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
+        let number = at.map_or(0, |at| child + at as u32);
+        fine.add(number, &mut node, &boxes);
         match at {
             None => root = node,
             Some(at) => *nodes.get_mut(at)? = node,
@@ -307,11 +313,12 @@ mod tests {
         };
         // A root and its part of the nodes above are 11 / 7 nodes (the layout proves it).
         let mut nodes = vec![Node::EMPTY; boxes.len() * 11 / 7];
-        let top = build(&mut items, leaf, &mut nodes, 1000, 1e-6).unwrap();
+        let mut fine = FineList::new(&mut []);
+        let top = build(&mut items, leaf, &mut nodes, 1000, 1e-6, &mut fine).unwrap();
         let Top { root, count, levels } = top;
         // One less is too few.
         let mut few = vec![Node::EMPTY; count as usize - 1];
-        assert!(build(&mut items, leaf, &mut few, 1000, 1e-6).is_none());
+        assert!(build(&mut items, leaf, &mut few, 1000, 1e-6, &mut fine).is_none());
         let mut met = Vec::new();
         let mut todo = vec![(root, 1)];
         while let Some((node, level)) = todo.pop() {

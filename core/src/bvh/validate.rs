@@ -4,7 +4,8 @@
 //! holds it, with the margin that the slab test relies on ([`node`](super::node)). One walk over all nodes checks this:
 //!
 //! ```text
-//! node   a build writes such a node; each child may fill its box, cut with the boxes above
+//! node   a build writes such a node; each child may fill its box, cut with the boxes above; fine sides, if it has
+//!        some, are its own and cut that box, too
 //! leaf   each triangle is finite, lies in what its leaf may fill, and has no bit in scratch yet: set it
 //! end    as many nodes and ids were met as there are
 //! ```
@@ -61,9 +62,6 @@ impl Bvh<'_> {
         if Quality::from_u32(header.quality).is_none() {
             return Err(corrupt(core::mem::offset_of!(Header, quality)));
         }
-        if header.hash_count != 0 {
-            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
-        }
         if header.reference_count != survey.finite_count {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
         }
@@ -78,7 +76,7 @@ impl Bvh<'_> {
         let (mut depth, mut deepest) = (0, 1);
         // Every node is met once.
         let mut budget = Budget::new(self.nodes.len());
-        let mut ids = 0;
+        let (mut ids, mut fine_count) = (0, 0);
         let start = |node: u32, min, max| OpenNode { node, rest: 0xff, min, max };
         let everywhere = DVec3::INFINITY;
         if self.nodes.is_empty() {
@@ -95,6 +93,13 @@ impl Bvh<'_> {
                     return Err(wrong);
                 }
                 node.check(least, number == 0 && self.ids.is_empty()).ok_or(wrong)?;
+                if node.has_fine_sides() {
+                    let fine = self.fine_sides(node).ok_or(wrong)?;
+                    if !fine.are_of(number, node) {
+                        return Err(wrong);
+                    }
+                    fine_count += 1;
+                }
             }
             if level.rest == 0 {
                 let Some(above) = depth.checked_sub(1) else { break };
@@ -104,7 +109,11 @@ impl Bvh<'_> {
             let slot = level.rest.trailing_zeros();
             level.rest &= level.rest - 1;
             let (min, max) = node.holds(slot as usize);
-            let (min, max) = (level.min.max(min), level.max.min(max));
+            let (mut min, mut max) = (level.min.max(min), level.max.min(max));
+            if let Some(fine) = self.fine_sides(node) {
+                let holds = fine.holds(node, slot as usize);
+                (min, max) = (min.max(holds.0), max.min(holds.1));
+            }
             match node.child(slot) {
                 Child::Inner(child) => {
                     if child as usize >= self.nodes.len() {
@@ -135,6 +144,9 @@ impl Bvh<'_> {
         if ids != self.ids.len() || !budget.is_used_up() {
             return Err(corrupt(core::mem::offset_of!(Header, node_count)));
         }
+        if fine_count != self.fine.len() {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
+        }
         if header.levels as usize != deepest {
             return Err(corrupt(core::mem::offset_of!(Header, levels)));
         }
@@ -147,7 +159,8 @@ const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-6
 
 impl Node {
     /// Returns `None` if no build writes such a node. Its origin and steps must be finite, its steps not too small.
-    /// Each child must be a node or a leaf, not both. It must have a child, unless it `may_be_empty`.
+    /// Each child must be a node or a leaf, not both; the box of one that is not there is inside out. The node must
+    /// have a child, unless it `may_be_empty`.
     fn check(&self, least: f64, may_be_empty: bool) -> Option<()> {
         let steps = self.steps().map(f64::from);
         let are_steps = self.exponents().iter().all(|exponent| (1..=253).contains(exponent))
@@ -160,7 +173,12 @@ impl Node {
             if count > LEAF || is_inner && count > 0 {
                 return None;
             }
-            children += usize::from(is_inner || count > 0);
+            let is_there = is_inner || count > 0;
+            let sides = self.bounds.map(|side| side[slot]);
+            if !is_there && sides != Self::EMPTY.bounds.map(|side| side[slot]) {
+                return None;
+            }
+            children += usize::from(is_there);
         }
         (are_steps && (children > 0 || may_be_empty)).then_some(())
     }

@@ -20,6 +20,7 @@ use fearless_simd::{Simd, f32x8, u32x8};
 
 use super::Bvh;
 use super::boxes::{bits, splat};
+use super::fine::FineSides;
 use super::node::{Child, Node, WIDTH, floats};
 use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::{FLIP, NearSides, Slab, flips_of};
@@ -128,19 +129,35 @@ impl<S: Simd> Wide<S> {
     /// Intersects the ray with the boxes of a node. Returns a mask of those that it enters before its end, and the
     /// entry distances.
     #[inline(always)]
-    fn meet(&self, simd: S, node: &Node, flips: NearSides, end: f32) -> (u32, f32x8<S>) {
+    fn meet(
+        &self,
+        simd: S,
+        node: &Node,
+        fine: Option<&FineSides>,
+        flips: NearSides,
+        end: f32,
+    ) -> (u32, f32x8<S>) {
         // Splat integers: floats would be loaded into one lane first and then broadcast.
         let [x, y, z] = node.origin;
         let origin = [u32x8::splat(simd, x), u32x8::splat(simd, y), u32x8::splat(simd, z)];
         let steps = node.wide_steps(simd);
         let mut distances = [(self.start, self.start); 3];
         for axis in 0..3 {
-            let near = side(simd, node, axis, flips[axis]);
-            let far = side(simd, node, axis, flips[axis] ^ FLIP);
-            let origin = origin[axis].bitcast::<f32x8<S>>();
-            // The product is exact, eight bits times a power of two: fused or not, the sum has the same bits.
-            let near = near.mul_add(steps[axis], origin - self.origin_near[axis]);
-            let far = far.mul_add(steps[axis], origin - self.origin_far[axis]);
+            let (near_side, far_side) = (axis + (flips[axis] & FLIP), axis + (!flips[axis] & FLIP));
+            let (near, far) = match fine {
+                None => {
+                    let near = side(simd, node, near_side);
+                    let far = side(simd, node, far_side);
+                    let origin = origin[axis].bitcast::<f32x8<S>>();
+                    // The product is exact, eight bits times a power of two: fused or not, the sum has the same bits.
+                    let near = near.mul_add(steps[axis], origin - self.origin_near[axis]);
+                    (near, far.mul_add(steps[axis], origin - self.origin_far[axis]))
+                }
+                Some(fine) => (
+                    fine.side(simd, near_side) - self.origin_near[axis],
+                    fine.side(simd, far_side) - self.origin_far[axis],
+                ),
+            };
             distances[axis] = (near * self.inverse_near[axis], far * self.inverse_far[axis]);
         }
         let [x, y, z] = distances;
@@ -248,7 +265,7 @@ fn predicted(slot: u32) -> u32 {
     }
 }
 
-/// Does the same as [`Wide::meet`] box by box, for machines without vectors.
+/// Does the same as [`Wide::meet`] box by box, without fine sides, for machines without vectors.
 #[inline(never)]
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
     let flips = flips_of(slab);
@@ -273,10 +290,10 @@ fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>)
     (met, f32x8::simd_from(simd, nearest))
 }
 
-/// A side of eight boxes as numbers.
+/// A side of eight boxes as numbers, in steps.
 #[inline(always)]
-fn side<S: Simd>(simd: S, node: &Node, axis: usize, flip: usize) -> f32x8<S> {
-    let row = row(node, axis, flip);
+fn side<S: Simd>(simd: S, node: &Node, side: usize) -> f32x8<S> {
+    let row = node.bounds[side % 6];
     floats(simd, row, row).0
 }
 
@@ -323,7 +340,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                 }
                 // Intersect the ray with the eight boxes of the node.
                 let (met, near) = match wide {
-                    Some(ray) => ray.meet(simd, node, flips, end),
+                    Some(ray) => ray.meet(simd, node, bvh.fine_sides(node), flips, end),
                     None => meet(simd, slab, node, end),
                 };
                 if met == 0 {
@@ -426,7 +443,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(slab, node, end) = self;
             let wide =
-                Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, flips_of(slab), end);
+                Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, None, flips_of(slab), end);
             let one_by_one = meet(simd, slab, node, end);
             [wide, one_by_one].map(|(met, near)| (met, near.into()))
         }

@@ -3,7 +3,7 @@
 use hgrid_core::{Config, Error, Grid, Method};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays};
-use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::meshes::{Mesh, ball, room, soup};
 use hgrid_tests::owned::prove;
 use hgrid_tests::random::Random;
 
@@ -280,6 +280,65 @@ fn nodes_are_what_a_build_writes() {
         case("levels without end", LEVELS..LEVELS + 4, |b| b.set_word(LEVELS, u32::MAX)),
     ]);
     refused(&seed, &cases);
+}
+
+/// The size of a node's fine sides, and the offset of its number behind them.
+const FINE: usize = 196;
+const OWNER: usize = 192;
+
+#[test]
+fn fine_sides_belong_to_one_node_and_hold_its_children() {
+    let seed = Seed::new(room(), Config::new(Method::Bvh));
+    let t = Tree::of(&seed.blob);
+    let copy = Copy::of(&seed.blob);
+    let fine = t.at(t.node_count, 0).next_multiple_of(64);
+    let count = copy.word(HASH_COUNT);
+    assert!(count > 1);
+    let of = |number: u32| {
+        let is_owner = |&node: &usize| copy.word(t.at(node, FIRST)) == 1 << 31 | number;
+        (0..t.node_count).find(is_owner).expect("a node for all fine sides")
+    };
+    let (root, other) = (of(0), of(1));
+    assert_eq!((root, copy.word(fine + OWNER)), (0, 0));
+    assert_eq!(copy.word(fine + FINE + OWNER) as usize, other);
+    let side = |side: usize, slot: usize| fine + FINE + 32 * side + 4 * slot;
+    let &(slot, _) = t.children(&seed.blob, other).first().unwrap();
+    let mut cases = vec![
+        case("sides of another node", t.node(other), move |b| {
+            b.set_word(t.at(other, FIRST), 1 << 31);
+        }),
+        case("sides behind the last ones", t.node(other), move |b| {
+            b.set_word(t.at(other, FIRST), 1 << 31 | count);
+        }),
+        case("another owner", t.node(other), move |b| add(b, fine + FINE + OWNER, 1)),
+        case("sides that no node has", HASH_COUNT..HASH_COUNT + 4, move |b| {
+            b.set_word(t.at(other, FIRST), 0);
+        }),
+        case("fewer sides", 0..HEAD, |b| add(b, HASH_COUNT, -1)),
+        case("sides that no memory holds", 0..HEAD, |b| b.set_word(HASH_COUNT, u32::MAX)),
+    ];
+    for axis in 0..3 {
+        // Sides in the middle of the box cut triangles off.
+        let [low, high] = [side(axis, slot), side(axis + 3, slot)];
+        let [from, to] = [low, high].map(|at| f32::from_bits(copy.word(at)));
+        let middle = (0.5 * (from + to)).to_bits();
+        for (what, at) in [("a least side inside", low), ("a greatest side inside", high)] {
+            cases.push(case(what, t.all(), move |b| b.set_word(at, middle)));
+        }
+        // A number that is none holds nothing.
+        cases.push(case("no number", t.all(), move |b| b.set_word(low, f32::NAN.to_bits())));
+    }
+    refused(&seed, &cases);
+
+    // Wider sides are right.
+    let mut copy = Copy::of(&seed.blob);
+    for axis in 0..3 {
+        copy.set_word(side(axis, slot), (-2.0_f32).to_bits());
+        copy.set_word(side(axis + 3, slot), 2.0_f32.to_bits());
+    }
+    let grid = Grid::open(copy.bytes(), seed.mesh.view()).unwrap();
+    prove(&grid).unwrap();
+    answers_right(&grid, &seed.mesh);
 }
 
 #[test]

@@ -16,6 +16,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, TriangleItem, area};
 use crate::aabb::Aabb;
+use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
 use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
 use crate::invariant::OrBug;
@@ -34,7 +35,7 @@ pub(super) const MOST_LEVELS: u32 = HALVED_FROM + 11;
 const _: () = assert!(MOST_LEVELS <= LEVELS);
 
 /// A range of triangles over which nodes are to be made.
-pub(super) struct Grow<'w> {
+pub(super) struct Grow<'w, 'f> {
     /// The triangles, in any order that the mesh alone determines.
     pub(super) items: &'w mut [TriangleItem],
     /// Levels of nodes above.
@@ -42,6 +43,8 @@ pub(super) struct Grow<'w> {
     /// A range of at most this many triangles is left to a task: its node stores the range, if there is room
     /// for the node.
     pub(super) wait: u32,
+    /// Destination of fine sides, for the top nodes.
+    pub(super) fine: Option<&'w mut FineList<'f>>,
     /// Destination of the nodes below the root.
     pub(super) nodes: &'w mut [Node],
     /// The number of the first of them in the index.
@@ -104,7 +107,7 @@ fn corners(sides: &Sides) -> Aabb {
     Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
 }
 
-impl Kernel for Grow<'_> {
+impl Kernel for Grow<'_, '_> {
     type Output = Grown;
 
     #[inline(always)]
@@ -176,6 +179,7 @@ impl Kernel for Grow<'_> {
             }
             // Quantise the boxes, and write the node.
             node.set_boxes(&bounds, &boxes, self.least);
+            self.add_fine_sides(&job, &mut node, &boxes);
             match job.place.checked_sub(1) {
                 None => grown.root = node,
                 Some(place) => {
@@ -189,7 +193,21 @@ impl Kernel for Grow<'_> {
     }
 }
 
-impl Grow<'_> {
+impl Grow<'_, '_> {
+    /// Gives fine sides to a node, if it is one of the top nodes, none of its children is a leaf, and it is worth it.
+    #[inline(never)]
+    fn add_fine_sides(&mut self, job: &Job, node: &mut Node, boxes: &[Aabb; WIDTH]) {
+        // Without room for nodes, ranges do not wait: choose the same nodes as with room.
+        let is_top = job.place == 0 || job.end - job.start > self.wait;
+        if let Some(fine) = &mut self.fine
+            && is_top
+            && node.counts == [0; WIDTH]
+        {
+            let number = job.place.checked_sub(1).map_or(0, |place| self.child + place);
+            fine.add(number, node, boxes);
+        }
+    }
+
     /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer.
     #[inline(always)]
     fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [SubRange; WIDTH] {

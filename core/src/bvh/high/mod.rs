@@ -6,7 +6,7 @@
 //! below     the nodes over each of these ranges
 //!
 //! index   | header | ids: of top nodes' leaves, then of each range | nodes: top | below each range |
-//! scratch | items: 32 B a triangle; the record of a range that is done replaces its items  |
+//! scratch | items: 32 B a triangle; the record of a range that is done replaces its items  | fine sides |
 //! ```
 //!
 //! A node cuts the range of its triangles until it has eight children, or no child is a node; and only a range of nine
@@ -30,7 +30,8 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
-use super::index::{clear_header, cut_index, finish, move_nodes};
+use super::fine::{FineList, FineSides, most_fine};
+use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
 use super::layout::index_bytes;
 use super::node::{Node, least_node};
 use crate::aabb::Aabb;
@@ -60,7 +61,9 @@ pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     let triangles = triangles as u64;
     // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
-    (index_bytes(triangles, most_high_nodes(triangles)), section_bytes::<TriangleItem>(items))
+    let index = index_bytes(triangles, most_high_nodes(triangles), most_fine(triangles));
+    let scratch = section_bytes::<TriangleItem>(items);
+    (index, scratch + section_bytes::<FineSides>(most_fine(triangles)))
 }
 
 /// Triangles of the ranges that tasks take, at most: a part of all, so that there are enough for many tasks.
@@ -91,11 +94,11 @@ pub(super) fn build_in(
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let (index_bound, needed_bytes) = bound(triangles);
     let scratch = first_mut(scratch, needed_bytes, Region::Scratch)?;
-    let items =
-        match split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch") {
-            Some((items, _)) => items,
-            None => &mut [],
-        };
+    let split = split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch");
+    let (items, rest) = split.unwrap_or_default();
+    let most = most_fine(triangles.into());
+    let room = split_mut::<FineSides>(rest, most).or_bug("too little scratch");
+    let mut fine = FineList::new(room.unwrap_or_default().0);
     // Tasks fill their parts of the index side by side, which takes the bound. With less room, run one task.
     let mut tasks = task_count(control, triangles as usize / LEAST_TASK);
     if index_available < index_bound {
@@ -114,10 +117,11 @@ pub(super) fn build_in(
     let unit = inverse_power(bounds.size().max_element());
     let work = HighInputs { least: least_node(&bounds), unit, tasks };
     let (ids, nodes) = cut_index(&mut index, finite as u32);
-    let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
+    let (nodes, levels) = work.make(items, ids, nodes, &mut fine, control, watch)?;
 
     watch.at(DONE)?;
-    finish(mesh, Quality::High, bounds, index, finite as u32, node_count, levels)
+    let contents = Contents { nodes, levels, fine: fine.finish() };
+    finish(mesh, Quality::High, bounds, index, finite as u32, contents)
 }
 
 /// A power of two near the inverse of a length.
@@ -276,6 +280,7 @@ impl RangesTask<'_> {
                 items,
                 level: waiter.level,
                 wait: 0,
+                fine: None,
                 nodes: nodes.get_mut(node_count as usize..).unwrap_or_default(),
                 child: child + node_count,
                 ids: ids.get_mut(id_count as usize..).unwrap_or_default(),
@@ -301,6 +306,7 @@ impl HighInputs {
         items: &mut [TriangleItem],
         ids: &mut [u32],
         nodes: &mut [Node],
+        fine: &mut FineList<'_>,
         control: &Control<'_>,
         watch: &Watch<'_>,
     ) -> Result<(u32, u32), Error> {
@@ -316,6 +322,7 @@ impl HighInputs {
             items,
             level: 0,
             wait: most_of_range(all as usize),
+            fine: Some(fine),
             nodes: nodes.get_mut(1..).unwrap_or_default(),
             child: 1,
             ids,
