@@ -103,7 +103,7 @@ fn vertices_that_did_not_move_leave_trees_of_all_kinds_as_they_are() {
     let mut loose = soup(300, 0.2, 6);
     loose.positions.push([1e20; 3]);
     let high = Config::from(Parameters::Bvh { quality: Quality::High });
-    for mesh in [soup(700, 0.2, 5), deep, loose] {
+    for mesh in [soup(700, 0.2, 5), deep, loose, room()] {
         let narrow: Vec<_> =
             mesh.indices.iter().map(|all| all.map(|at| u16::try_from(at).unwrap())).collect();
         let (positions, indices) = (Strided::new(&mesh.positions), Strided::new(&narrow));

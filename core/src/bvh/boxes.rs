@@ -1,7 +1,7 @@
 //! The boxes of a node or a leaf as numbers, and the slab tests of rays and beams against them.
 //!
 //! ```text
-//! decode      side = byte * step + node's origin - origin of the group
+//! decode      side = byte * step + node's origin - origin of the group, or fine side - origin of the group
 //! beam        the interval of all rays against eight boxes: which are met by none, which by all
 //! one ray     against eight boxes
 //! more rays   sixteen against one box
@@ -16,6 +16,8 @@
 //!                            far: these, and the factor for far sides                               7 u
 //! absolute                   origin 1, its product 1, and 4 of those above, relative to the origin  6 u * origin
 //! ```
+//!
+//! Fine sides have one rounding less.
 //!
 //! The factor for far sides is 1 + 16 u, and boxes grow by 8 u times the largest coordinate of an origin. Products stay
 //! finite, because trees with an extent of 2^48 and more are not traced in groups.

@@ -17,10 +17,10 @@
 //! ```
 //!
 //! `spare` is the second buffer when a bin is sorted. While a crowded bin is divided, its centres lie in the index;
-//! `spare` holds those that have no room there. `sizes` computes the exact size by a build without an index: it
-//! also puts the keys and the top tree into `spare`, and only counts ids and nodes. A build puts the keys there,
-//! too, if they do not fit into the index: an index of exact size has no room for keys of triangles that are
-//! skipped.
+//! `spare` holds those that have no room there. `sizes` computes the exact size by a build without an index: it also
+//! puts the keys and the top tree into `spare`, and only counts ids and nodes; fine sides stay in `entries`. A build
+//! puts the keys there, too, if they do not fit into the index: an index of exact size has no room for keys of
+//! triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by units. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up

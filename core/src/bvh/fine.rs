@@ -1,9 +1,13 @@
 //! Fine sides: the boxes of a node's children as f32, beside the eight bits a side of [`node`](super::node).
 //!
-//! A step of eight bits is about a 254th of a node. A child that is thinner (a wall, a floor, a small object in a large
-//! scene) gets a box that is one or two steps thick. Rays that start near the child then enter its box, and all that
-//! is below it, though they do not come close. So a node with such a child has a second set of sides, and so has the
-//! root. A query may use either set: both hold all triangles.
+//! A step is about a 254th of a node. A child that is thinner (a wall, a floor, a small object in a large scene) gets a
+//! box that is one or two steps thick. Rays that start near the child then enter its box, and all that is below it,
+//! though they do not come close. So a node with such a child has a second set of sides. The root also has one, if the
+//! mesh has 2048 triangles or more: rays often start at the outer walls. A query may use either set: both hold all
+//! triangles.
+//!
+//! Quality `fast` gives fine sides to nodes above the roots of subtrees, nearest to the root of the tree first; quality
+//! `high` to nodes above the ranges of tasks.
 //!
 //! ```text
 //! bvh: | ids | nodes | fine sides: 6 x 8 x f32 and the number of the node, for each node that has them |
@@ -26,12 +30,12 @@ use crate::aabb::Aabb;
 
 /// The bit of [`Node::first`] that says that a node has fine sides; the others are their number. No place of an id has
 /// it, as there are at most 2^31 ids.
-pub(crate) const HAS_FINE: u32 = 1 << 31;
+const HAS_FINE: u32 = 1 << 31;
 
 /// A child whose box is no thicker than so many steps is worth fine sides.
 const THIN: u8 = 5;
-/// An axis counts if the boxes of a node are at least so many steps wide together. They are not if steps have the least
-/// size.
+/// A node counts on an axis if its boxes together are at least so many steps wide. A flat node does not: its step has
+/// the least size.
 const WIDE: u8 = 64;
 
 /// Nodes with fine sides, at most: one for so many triangles.
@@ -118,8 +122,8 @@ impl FineSides {
         Self { sides: [least, least, least, greatest, greatest, greatest], node: u32::MAX }
     };
 
-    /// Returns true if they are those of the node with a number, all are numbers, and the boxes of children that are not
-    /// there are inside out.
+    /// Returns true if they are those of the node with a number, all are numbers, and the boxes of children that are
+    /// not there are inside out.
     pub(crate) fn are_of(&self, number: u32, node: &Node) -> bool {
         let is_inside_out = |slot: usize| {
             let none = Self::NONE.sides.map(|side| side[slot].to_bits());
@@ -157,13 +161,19 @@ impl FineSides {
 }
 
 impl Node {
+    /// Which fine sides are those of the node; a number that no list reaches if it has none.
+    #[inline(always)]
+    pub(crate) const fn fine_place(&self) -> usize {
+        // Without the bit, the number is 2^31 or more.
+        (self.first ^ HAS_FINE) as usize
+    }
+
     /// Returns true if the node has fine sides.
     pub(crate) const fn has_fine_sides(&self) -> bool {
         self.first & HAS_FINE != 0
     }
 
-    /// Returns true if the box of a child, quantised to eight bits, is so thin on an axis that it may be many times as
-    /// thick as the child.
+    /// Returns true if a child is so thin on an axis that its quantised box may be many times as thick.
     fn is_worth_fine_sides(&self) -> bool {
         (0..3).any(|axis| self.is_thin_on(axis))
     }

@@ -67,7 +67,8 @@ pub(super) struct Contents<'f> {
     pub(super) fine: &'f [FineSides],
 }
 
-/// Ends a build: writes the fine sides to the index, if there is one and it holds the tree, and returns the header.
+/// Ends a build: writes the fine sides, and zeros between and behind the sections, if there is an index; returns the
+/// header. An index that is too small is an error.
 pub(super) fn finish(
     mesh: &TriangleMesh<'_>,
     quality: Quality,

@@ -7,8 +7,8 @@
 //!
 //! The bounds of quality `fast` depend on the number `n` of triangles alone ([`high`](super::high) has its own):
 //!
-//! - A node below a root has eight children, or none that are nodes: (m - 1) / 7 nodes at most for `m` triangles
-//!   ([`subtree`](super::subtree)).
+//! - A node of a subtree has eight children, or none that are nodes. So a root over `m` triangles has no more than
+//!   (m - 1) / 7 nodes below it ([`subtree`](super::subtree)).
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
 //!   1 + 4/7 = 11/7 nodes, itself included.
@@ -44,8 +44,8 @@ use crate::blob::HEADER_BYTES;
 use super::fine::FineSides;
 use super::node::Node;
 
-/// Levels of nodes, at most. Quality `fast` makes up to 49: 20 by SAH and 9 that halve roots ([`top`](super::top)), and
-/// 20 of a subtree, which has at most 20 nodes ([`subtree`](super::subtree)). Quality `high` makes up to 35
+/// Levels of nodes, at most. Quality `fast` makes up to 47: 20 by SAH and 9 that halve roots ([`top`](super::top)), and
+/// 18 of a subtree, which has at most 18 nodes ([`subtree`](super::subtree)). Quality `high` makes up to 35
 /// ([`high`](super::high)). The rest is reserve.
 pub(crate) const LEVELS: u32 = 64;
 

@@ -77,7 +77,7 @@ use crate::simd::prefetch;
 use crate::visit::Visitor;
 pub(crate) use batch::Groups;
 pub(crate) use build::{bound, build, sizes};
-use fine::{FineSides, HAS_FINE};
+use fine::FineSides;
 pub(crate) use group::{Group, Together};
 pub(crate) use layout::LEVELS;
 use node::{LEAF, Node};
@@ -195,8 +195,7 @@ impl<'a> Bvh<'a> {
     /// The fine sides of a node, if it has some.
     #[inline(always)]
     fn fine_sides(&self, node: &Node) -> Option<&'a FineSides> {
-        // Without the bit, the number is 2^31 or more, which no list has.
-        self.fine.get((node.first ^ HAS_FINE) as usize)
+        self.fine.get(node.fine_place())
     }
 
     /// Passes all leaves to a visitor; `false` if its budget is used up.

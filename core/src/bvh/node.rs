@@ -30,6 +30,9 @@ pub(crate) const WIDTH: usize = 8;
 /// Ids in a leaf, at most: one vector of triangles.
 pub(crate) const LEAF: usize = 8;
 
+/// Triangles that a query reads at once: a leaf of fewer takes as long. Such leaves are not cut.
+pub(crate) const SMALL_LEAF: usize = 4;
+
 /// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one minimum.
 pub(crate) type Sides = [f32; 8];
 
@@ -44,8 +47,8 @@ pub(crate) struct Node {
     pub(crate) word: u32,
     /// The first child node; the others follow it.
     pub(crate) child: u32,
-    /// Place of the first id of the first leaf; those of the others follow. In a node that has [fine
-    /// sides](super::fine), which of them are its own.
+    /// Place of the first id of the first leaf; those of the others follow. In a node with [fine sides](super::fine):
+    /// which of them are its own.
     pub(crate) first: u32,
     /// Number of ids of each leaf.
     pub(crate) counts: [u8; WIDTH],

@@ -18,7 +18,7 @@ use fearless_simd::{Simd, f32x4, f32x8};
 use glam::Vec3A;
 
 use super::Bvh;
-use super::fine::{ExactBox, FineSides, HAS_FINE};
+use super::fine::{ExactBox, FineSides};
 use super::layout::LEVELS;
 use super::node::{Child, LEAF, Node, Sides, WIDTH, floats, least_node};
 use super::stack::FEW_LEVELS;
@@ -255,7 +255,7 @@ impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
             }
             cost.add(simd, node, level.number == 0);
             thinnest = lesser(thinnest, lesser(-(x + u), lesser(-(y + v), -(z + w))));
-            if let Some(sides) = fine.get_mut((node.first ^ HAS_FINE) as usize) {
+            if let Some(sides) = fine.get_mut(node.fine_place()) {
                 for (slot, exact) in level.boxes.iter().enumerate() {
                     if node.inner() >> slot & 1 == 1 {
                         sides.set(node, slot, exact);

@@ -13,10 +13,11 @@
 //! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by
 //!   2^-38 of the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the tree's extent. The
 //!   relative margin covers the first; [`growth_of_range`] adds twice the second.
-//! - **Zero directions.** Their inverse is [`STEEP`]: no step is below 2^-60 of the tree's extent and the margin of a
-//!   box is 2^-11 of a step or more ([`fine`](super::fine)), so a ray inside one leaves it eight extents away, behind
-//!   the tree's box, and one outside never enters. Products stay finite as long as the tree's extent is below 2^50;
-//!   beyond, a NaN counts as a box that is met.
+//! - **Zero directions.** Their inverse is [`STEEP`]. `validate` accepts no step below 2^-61 of the tree's extent and
+//!   no margin below 2^-11 of a step ([`fine`](super::fine)). So a ray inside a box leaves it eight extents away or
+//!   more. A ray starts at most 4.5 extents from any side of the tree's box, so that is behind it; and a ray outside
+//!   never enters. Products stay finite as long as the tree's extent is below 2^50; beyond, a NaN counts as a box that
+//!   is met.
 //! - **Far origins.** The ray starts at a point near the tree ([`Approach`]), which may be off the ray by
 //!   `slack`; near sides are that much nearer, far sides farther.
 //!

@@ -12,11 +12,13 @@
 //! ```
 //!
 //! A part is small if it has four triangles or fewer. A query reads four at once, so two leaves of two take twice as
-//! long as one of four. Small parts are cut only by the two highest bits of a range, as they may be wide there.
+//! long as one of four. Two bits also cut small parts, which may be wide there: the highest that changes in the range,
+//! and the next that changes anywhere in the subtree.
 //!
-//! `m` triangles have (m - 1) / 7 nodes at most. Let `a` nodes have nodes among their children, and `b` have none. The
-//! first have eight children each: all nodes but the root, and leaves of one triangle or more. The others have nine
-//! triangles or more each. So m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes
+//! `m` triangles have one node, or (m - 1) / 7 at most. Let `a` nodes have nodes among their children, and `b` have
+//! none. Each of the `a` has eight children. Of these 8 a children, a + b - 1 are nodes (all but the root); the others
+//! are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the only node. So
+//! m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes
 //! for the memory bound is cut again, by halves only.
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
@@ -36,7 +38,7 @@ use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
 use super::layout::{Entry, MOST_ROOT, most_of_root};
-use super::node::{LEAF, Node, Sides, WIDTH};
+use super::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH};
 
 /// Nodes of a subtree, at most; one to spare.
 const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
@@ -56,7 +58,7 @@ pub(crate) struct Subtree {
     ranges: [EntryRange; MOST_NODES],
     /// Levels above each node.
     above: [u8; MOST_NODES],
-    /// No number in `changes` inside each range is higher than this, unless it is inside a small part.
+    /// No number in `changes` inside each range is higher than this.
     tops: [u8; MOST_NODES],
     count: usize,
     /// The boxes of the triangles, then those of the nodes.
@@ -81,9 +83,10 @@ pub(crate) enum Cut {
     Halves,
 }
 
-/// Triangles of a part that is small, at most.
-const SMALL: u8 = 4;
-/// The number of bits, from the first one that changes in a range, that also cut small parts.
+/// Entries of a part that is small, at most.
+const SMALL: u8 = SMALL_LEAF as u8;
+/// The number of bits that also cut small parts, from the first that changes in the range; of the others each counts
+/// that changes anywhere in the subtree.
 const FREE_BITS: u32 = 2;
 
 /// A range of entries.
@@ -428,7 +431,7 @@ const fn inside_small(first: u128, last: u128) -> u128 {
     first & (one | two | three) | first << 1 & (one | two) | first << 2 & one
 }
 
-const _: () = assert!(SMALL == 4);
+const _: () = assert!(SMALL == 4, "three shifts find parts of four entries");
 
 #[cfg(test)]
 mod tests {
@@ -501,8 +504,8 @@ mod tests {
                     let mut ids = walk(subtree, subtree.levels());
                     ids.sort_unstable();
                     assert!(ids.iter().copied().eq(0..count as u32), "{count} {which} {by:?}");
-                    let most = count.saturating_sub(1) / 7 + 1;
-                    assert!(subtree.below().len() < most.max(2), "{count} {which} {by:?}");
+                    let most = (count.saturating_sub(1) / 7).max(1);
+                    assert!(subtree.below().len() < most, "{count} {which} {by:?}");
                     // Halves are cheap enough for the bound.
                     assert!(subtree.below().len() <= most_of_root(count), "{count} {which}");
                 }

@@ -157,15 +157,22 @@ impl Bvh<'_> {
 /// No step is smaller than this part of the tree's extent: half of a build's.
 const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-61
 
+/// No coordinate of an origin is more than so many steps: twice as many as in a build.
+const MOST_STEPS: f64 = 4_194_304.0; // 2^22
+
 impl Node {
-    /// Returns `None` if no build writes such a node. Its origin and steps must be finite, its steps not too small.
-    /// Each child must be a node or a leaf, not both; the box of one that is not there is inside out. The node must
-    /// have a child, unless it `may_be_empty`.
+    /// Returns `None` if no build writes such a node. Its origin and steps must be finite, its steps not too small,
+    /// also beside the origin: the margin would be lost in the rounding of coordinates. Each child must be a node or a
+    /// leaf, not both; the box of one that is not there is inside out. The node must have a child, unless it
+    /// `may_be_empty`.
     fn check(&self, least: f64, may_be_empty: bool) -> Option<()> {
         let steps = self.steps().map(f64::from);
         let are_steps = self.exponents().iter().all(|exponent| (1..=253).contains(exponent))
             && steps.iter().all(|&step| step >= least)
-            && self.origin().iter().all(|origin| origin.is_finite());
+            && self.origin().iter().zip(&steps).all(|(origin, step)| {
+                // Also false of NaN and infinity.
+                f64::from(origin.abs()) <= step * MOST_STEPS
+            });
         let mut children = 0;
         for slot in 0..WIDTH {
             let is_inner = self.inner() >> slot & 1 == 1;

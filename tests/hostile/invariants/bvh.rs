@@ -236,6 +236,20 @@ fn nodes_are_what_a_build_writes() {
             }));
         }
     }
+    // Take a node that has an empty slot.
+    let has_room = |&node: &usize| t.children(&seed.blob, node).len() < 8;
+    let short = (0..t.node_count).find(has_room).expect("a node with fewer children");
+    let empty = t.children(&seed.blob, short).len();
+    for side in 0..6 {
+        cases.push(case("a box without a child", t.node(short), move |b| {
+            b.set(t.at(short, BOUNDS + 8 * side + empty), &[7]);
+        }));
+    }
+    // The margin of a box is less than the last digit of its coordinates.
+    cases.push(case("steps much smaller than the origin", t.node(short), move |b| {
+        b.set_word(t.at(short, ORIGIN), 1e6_f32.to_bits());
+        b.set(t.at(short, EXPONENTS), &[100]);
+    }));
     let counts_at = move |slot: usize| t.at(node, COUNTS + slot);
     let header = NODE_COUNT..NODE_COUNT + 4;
     cases.extend([

@@ -18,12 +18,9 @@ use super::cut::{Bins, Extent, ID, TriangleItem, area};
 use crate::aabb::Aabb;
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
-use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
+use crate::bvh::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
-
-/// Triangles of a part that is not cut, at most: a query reads so many at once.
-const SMALL: u32 = 4;
 
 /// The level from which on ranges are halved.
 const HALVED_FROM: u32 = 24;
@@ -226,11 +223,8 @@ impl Grow<'_, '_> {
             let part = parts[at];
             let range = part.start as usize..part.end as usize;
             let Some(items) = self.items.get_mut(range).or_bug("a part too long") else { break };
-            let found = if halve || items.len() < 3 {
-                None
-            } else {
-                bins.cut(simd, items, &part.extent.centers, self.unit)
-            };
+            let found =
+                if halve { None } else { bins.cut(simd, items, &part.extent.centers, self.unit) };
             let (middle, extents) =
                 if let Some(found) = found { found } else { halves(simd, items) };
             #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
@@ -268,7 +262,7 @@ fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;
     let mut most = (false, -1.0, 0);
     for (at, part) in parts.iter().enumerate() {
-        if part.count() <= SMALL {
+        if part.count() <= SMALL_LEAF as u32 {
             continue;
         }
         let is_node = part.count() > LEAF as u32;

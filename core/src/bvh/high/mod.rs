@@ -9,11 +9,11 @@
 //! scratch | items: 32 B a triangle; the record of a range that is done replaces its items  | fine sides |
 //! ```
 //!
-//! A node cuts the range of its triangles until it has eight children, or no child is a node; and only a range of nine
-//! or more is a node. So `n` triangles have one node, or (n - 2) / 7 at most. By induction: let `j` of the children be
-//! nodes. For `j` = 0 one node is enough. Otherwise there are eight children; those that are no nodes have a triangle
-//! or more each, so the others have n - (8 - j) at most, and there are 1 + (n - (8 - j) - 2 j) / 7 = (n - 1 - j) / 7
-//! nodes at most. A chain of nodes with seven leaves of one triangle has as many.
+//! A node cuts the range of its triangles until it has eight children, or all have four triangles or fewer, so that no
+//! child is a node. Only a range of nine or more is a node. So `n` triangles have one node, or (n - 2) / 7 at most. By
+//! induction: let `j` of the children be nodes. For `j` = 0 one node is enough. Otherwise there are eight children;
+//! those that are no nodes have a triangle or more each, so the others have n - (8 - j) at most, and there are 1 + (n -
+//! (8 - j) - 2 j) / 7 = (n - 1 - j) / 7 nodes at most. A chain of nodes with seven leaves of one triangle has as many.
 //!
 //! The tree does not depend on the number of tasks: the ranges that tasks take are the same for any number, and
 //! their nodes end up side by side in the order of the triangles.
