@@ -121,15 +121,15 @@ pub(crate) fn split_mut<T: FromBytes + IntoBytes>(
 /// A section of `count` words at the start of `bytes`, and the bytes behind it. `None` also if the
 /// padding is not zero, as every build leaves it.
 pub(crate) fn split<T: FromBytes + Immutable>(bytes: &[u8], count: u64) -> Option<(&[T], &[u8])> {
-    let used = count.saturating_mul(size_of::<T>() as u64);
-    let (words, rest) = split_bytes(bytes, used, section_bytes::<T>(count))?;
+    let (words, rest) = split_bytes(bytes, count, size_of::<T>() as u64)?;
     Some((<[T]>::ref_from_bytes(words).ok()?, rest))
 }
 
-/// [`split`] for bytes: those of a section that are used, and those behind it. Out of line: one copy serves all types.
+/// [`split`] for words of any size, as bytes. Out of line: one copy serves all types.
 #[inline(never)]
-fn split_bytes(bytes: &[u8], used: u64, section: u64) -> Option<(&[u8], &[u8])> {
-    let (section, rest) = bytes.split_at_checked(usize::try_from(section).ok()?)?;
+fn split_bytes(bytes: &[u8], count: u64, size: u64) -> Option<(&[u8], &[u8])> {
+    let used = count.saturating_mul(size);
+    let (section, rest) = bytes.split_at_checked(usize::try_from(align_up(used)).ok()?)?;
     let (words, padding) = section.split_at_checked(usize::try_from(used).ok()?)?;
     if padding.iter().any(|&byte| byte != 0) { None } else { Some((words, rest)) }
 }

