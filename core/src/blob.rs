@@ -140,6 +140,11 @@ impl Header {
         Quality::from_u32(self.quality).unwrap_or_default()
     }
 
+    /// Nodes of a tree that have fine sides.
+    pub(crate) const fn fine_count(&self) -> u64 {
+        self.hash_count as u64
+    }
+
     /// The header as the first bytes of a blob.
     pub(crate) fn to_bytes(mut self) -> [u8; HEADER_BYTES] {
         self.checksum = self.sum();

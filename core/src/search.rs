@@ -36,18 +36,9 @@ pub(crate) trait Search {
         Outcome::Unchanged
     }
 
-    /// Returns true if the search already has the hit with this triangle, which a grid may list in several cells.
-    #[inline(always)]
-    fn knows(&self, _: u32) -> bool {
-        false
-    }
-
     /// Tests a triangle that passed the filter, and shows the hit if there is one.
     #[inline(always)]
     fn decide(&mut self, test: &TriangleTest, mesh: &TriangleMesh<'_>, id: u32) -> Outcome {
-        if self.knows(id) {
-            return Outcome::Unchanged;
-        }
         self.decided(test.decide(mesh, id))
     }
 
@@ -74,11 +65,6 @@ impl Search for One {
         }
         self.hit = hit;
         if self.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
-    }
-
-    #[inline(always)]
-    fn knows(&self, id: u32) -> bool {
-        self.hit.primitive == id
     }
 }
 

@@ -439,7 +439,7 @@ fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
     }
     assert!(folder.fails("figures nothing.ply -o new").unwrap().contains("cannot open it"));
     assert!(!folder.0.join("new").exists());
-    // Whether the file exists shows only when it is opened: that error has status 1.
+    // The command learns that a file does not exist when it opens it, and then ends with status 1.
     assert_eq!(folder.hgrid("render nothing.ply").unwrap().status.code(), Some(1));
 }
 

@@ -116,7 +116,7 @@ fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     assert_eq!(sections.at, header.blob_bytes);
 
     let (mut leaves, mut met, mut met_fine) = (Vec::new(), 0, 0);
-    // What a node may fill: the fine boxes above it, as leaves.
+    // Each node on the way down stands with the box that it may fill: the intersection of the fine boxes above it.
     let everywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
     let mut open = vec![(0, everywhere)];
     while let Some((number, (min, max))) = open.pop() {

@@ -1,9 +1,9 @@
 //! Fine sides: the boxes of a node's children as f32, beside the eight bits a side of [`node`](super::node).
 //!
-//! A step is about a 254th of a node. A child that is thinner (a wall, a floor, a small object in a large scene) gets a
-//! box that is one or two steps thick. Rays that start near the child then enter its box, and all that is below it,
-//! though they do not come close. So a node with such a child has a second set of sides. The root also has one, if the
-//! mesh has 2048 triangles or more: rays often start at the outer walls. A query may use either set: both hold all
+//! A step is a 127th to a 254th of a node. A child that is thinner (a wall, a floor, a small object in a large scene)
+//! gets a box that is one or two steps thick. Rays that start near the child then enter its box, and all that is below
+//! it, though they do not come close. So a node with such a child has a second set of sides. The root also has one, if
+//! the mesh has 2048 triangles or more: rays often start at the outer walls. A query may use either set: both hold all
 //! triangles.
 //!
 //! Quality `fast` gives fine sides to nodes above the roots of subtrees, nearest to the root of the tree first; quality
@@ -18,7 +18,7 @@
 //!
 //! Sides keep a distance from the exact box, as a ray along a side would otherwise cross it at distance 0
 //! ([`slab`](super::slab)): a build moves them by a 512th of a step, and by a bit of the coordinate; `validate` demands
-//! a 2048th. The sum of roundings needs no margin here: a side minus an origin is rounded once, relative to the result.
+//! a 2048th. Rounding needs no other margin here: a side minus an origin is rounded once, relative to the result.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
@@ -28,8 +28,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 use super::node::{Node, WIDTH};
 use crate::aabb::Aabb;
 
-/// The bit of [`Node::first`] that says that a node has fine sides; the others are their number. No place of an id has
-/// it, as there are at most 2^31 ids.
+/// The bit of [`Node::first`] that says that a node has fine sides; the other bits are their number. No place of an id
+/// has it, as there are at most 2^31 ids.
 const HAS_FINE: u32 = 1 << 31;
 
 /// A child whose box is no thicker than so many steps is worth fine sides.

@@ -48,7 +48,7 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
         let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
         let (nodes, behind) = split_mut::<Node>(behind, header.node_count.into())?;
-        Some((&*ids, nodes, split_mut::<FineSides>(behind, header.hash_count.into())?.0))
+        Some((&*ids, nodes, split_mut::<FineSides>(behind, header.fine_count())?.0))
     });
     let (ids, nodes, fine) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
     let mut tree = Tree { mesh, ids, nodes, fine, least: least_node(&bounds) };

@@ -17,9 +17,9 @@
 //!
 //! `m` triangles have one node, or (m - 1) / 7 at most. Let `a` nodes have nodes among their children, and `b` have
 //! none. Each of the `a` has eight children. Of these 8 a children, a + b - 1 are nodes (all but the root); the others
-//! are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the only node. So
-//! m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes
-//! for the memory bound is cut again, by halves only.
+//! are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the only node. So m >=
+//! 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes for the memory bound is cut
+//! again, by halves only.
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
@@ -40,7 +40,7 @@ use crate::simd::Kernel;
 use super::layout::{Entry, MOST_ROOT, most_of_root};
 use super::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH};
 
-/// Nodes of a subtree, at most; one to spare.
+/// Nodes of a subtree, at most, and one to spare.
 const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
 
 /// The boxes of nodes lie behind those of triangles in [`Subtree::boxes`].
@@ -70,7 +70,7 @@ pub(crate) struct Subtree {
     id_count: usize,
     /// One more than the highest bit in which the keys of entries `i` and `i + 1` differ, or 0.
     changes: [u8; MOST_ROOT],
-    /// The places of each number in `changes`, as bits; only those of numbers that occur are up to date.
+    /// For each number, its places in `changes`, as bits. Only entries of numbers that occur are up to date.
     places: [u128; 32],
 }
 

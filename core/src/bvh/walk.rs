@@ -375,9 +375,6 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                 let lane = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let Some(&id) = ids.get(lane) else { break };
-                if search.knows(id) {
-                    continue;
-                }
                 match search.decided(TriangleTest::decide_for(ray, cull, mesh, id)) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => end = slab.latest(t),

@@ -191,7 +191,8 @@ impl Kernel for Grow<'_, '_> {
 }
 
 impl Grow<'_, '_> {
-    /// Gives fine sides to a node, if it is one of the top nodes, none of its children is a leaf, and it is worth it.
+    /// Gives fine sides to a node, if it is one of the top nodes, none of its children is a leaf, and one of them is
+    /// thin.
     #[inline(never)]
     fn add_fine_sides(&mut self, job: &Job, node: &mut Node, boxes: &[Aabb; WIDTH]) {
         // Without room for nodes, ranges do not wait: choose the same nodes as with room.
