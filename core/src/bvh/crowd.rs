@@ -34,18 +34,19 @@ pub(crate) struct CrowdPart<'w> {
 /// y in the room for them, z in place of the key. Out of line: few units are crowded, and inlined it would slow down
 /// all others.
 #[inline(never)]
-pub(crate) fn centers(mesh: &TriangleMesh<'_>, part: CrowdPart<'_>) -> Aabb {
-    let CrowdPart { entries, xs, ys } = part;
-    debug_assert!(xs.len() >= entries.len() && ys.len() >= entries.len(), "no room for centres");
+pub(crate) fn centers(mesh: &TriangleMesh<'_>, parts: &mut [CrowdPart<'_>]) -> Aabb {
     let wide = mesh.wide();
     let mut centers = Aabb::EMPTY;
-    for ((entry, x), y) in entries.iter_mut().zip(xs).zip(ys) {
-        let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
-        let twice = min + max;
-        [*x, *y, entry[0]] = twice.to_array().map(f32::to_bits);
-        let center = twice * 0.5;
-        centers.min = centers.min.min(center);
-        centers.max = centers.max.max(center);
+    for CrowdPart { entries, xs, ys } in parts {
+        debug_assert!(xs.len() >= entries.len() && ys.len() >= entries.len(), "too little room");
+        for ((entry, x), y) in entries.iter_mut().zip(xs.iter_mut()).zip(ys.iter_mut()) {
+            let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
+            let twice = min + max;
+            [*x, *y, entry[0]] = twice.to_array().map(f32::to_bits);
+            let center = twice * 0.5;
+            centers.min = centers.min.min(center);
+            centers.max = centers.max.max(center);
+        }
     }
     centers
 }
@@ -106,16 +107,19 @@ fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
 /// Sorts the entries of a crowded unit by their bins; in a bin they keep their order. `heads` holds the place where
 /// each bin starts, and afterwards where it ends. Each entry moves to its place in the room of the centres, and back
 /// from there.
-pub(crate) fn sort_by_bin(mut parts: [CrowdPart<'_>; 2], heads: &mut [u32], shift: u32) {
-    let middle = parts[0].entries.len();
-    for from in [0, 1] {
+pub(crate) fn sort_by_bin(mut parts: [CrowdPart<'_>; 3], heads: &mut [u32], shift: u32) {
+    let second = parts[0].entries.len();
+    let third = second + parts[1].entries.len();
+    let starts = [0, second, third];
+    for from in 0..parts.len() {
         for at in 0..parts[from].entries.len() {
             let Some(&[key, id]) = parts[from].entries.get(at) else { break };
             let head = heads.get_mut((key >> shift) as usize).or_bug("a key without a bin");
             let Some(head) = head else { continue };
             // Chosen by number, not by a branch, which would often be mispredicted.
-            let part = usize::from(*head as usize >= middle);
-            let place = *head as usize - middle * part;
+            let place = *head as usize;
+            let part = usize::from(place >= second) + usize::from(place >= third);
+            let place = place - starts[part];
             let CrowdPart { xs, ys, .. } = &mut parts[part];
             let slots = xs.get_mut(place).zip(ys.get_mut(place)).or_bug("a bin is too small");
             if let Some((x, y)) = slots {
@@ -147,6 +151,7 @@ mod tests {
     use crate::mesh::MeshPart;
     use crate::random;
     use crate::simd::{SimdLevel, dispatch};
+    use crate::tasks::take;
 
     /// Checks keys and counts against those of each triangle alone.
     fn check(mesh: &TriangleMesh<'_>, ids: &[u32]) {
@@ -154,7 +159,7 @@ mod tests {
         let entries: Vec<Entry> = ids.iter().map(|&id| [7, id]).collect();
         let (mut noted, mut xs, mut ys) = (entries.clone(), ids.to_vec(), ids.to_vec());
         let part = CrowdPart { entries: &mut noted, xs: &mut xs, ys: &mut ys };
-        let rule = Keys::new(&centers(mesh, part));
+        let rule = Keys::new(&centers(mesh, &mut [part]));
         let (mut expected, mut expected_counts) = (entries.clone(), [0; 64]);
         for [key, id] in &mut expected {
             *key = rule.of(&Aabb::of(mesh.corners(*id).unwrap()).unwrap());
@@ -200,13 +205,13 @@ mod tests {
             let mut expected = entries.clone();
             expected.sort_by_key(|[key, _]| key >> 1);
             let (mut xs, mut ys) = (alloc::vec![0; entries.len()], alloc::vec![0; entries.len()]);
-            let middle = entries.len() / 3;
-            let (one, other) = entries.split_at_mut(middle);
-            let [(one_xs, other_xs), (one_ys, other_ys)] =
-                [xs.split_at_mut(middle), ys.split_at_mut(middle)];
-            let one = CrowdPart { entries: one, xs: one_xs, ys: one_ys };
-            let other = CrowdPart { entries: other, xs: other_xs, ys: other_ys };
-            sort_by_bin([one, other], &mut heads, 1);
+            let (count, mut rest) = (entries.len(), (&mut entries[..], &mut xs[..], &mut ys[..]));
+            let parts = [count / 3, count / 5, count - count / 3 - count / 5].map(|count| {
+                let (entries, xs, ys) = &mut rest;
+                let [xs, ys] = [take(xs, count), take(ys, count)];
+                CrowdPart { entries: take(entries, count), xs, ys }
+            });
+            sort_by_bin(parts, &mut heads, 1);
             assert_eq!(entries, expected);
         }
     }

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! Two of the three numbers of each centre of a crowded unit are stored in places that the build writes later in any
-//! case: of the ids of the unit, and of as many nodes as any tree over the triangles has. What has no room there is
-//! stored in `spare`. Once the entries have new keys, no centre is needed any more, and the same memory is the second
+//! case: one where the ids of the unit will be; the other where nodes will be, as many as any tree over the triangles
+//! has, and where the ids of later units will be. What has no room there is stored in `spare`. Once the entries have new keys, no centre is needed any more, and the same memory is the second
 //! buffer when they are sorted by bins.
 //!
 //! The record of a root is 112 bytes, written over entries that were used up:
@@ -112,8 +112,7 @@ impl Roots<'_> {
         if range.len() > MOST_UNIT {
             if depth < DIVISIONS {
                 let mesh = self.mesh;
-                let ([one, other], _) = self.crowd(&range);
-                let centers = crowd::centers(mesh, one).union(&crowd::centers(mesh, other));
+                let centers = crowd::centers(mesh, &mut self.crowd(&range).0);
                 if centers.size().max_element() > 0.0 {
                     self.divide(range, &centers, depth);
                     return;
@@ -245,29 +244,30 @@ impl Roots<'_> {
         sort_by_bin(parts, counts, shift);
     }
 
-    /// Returns the entries of a crowded unit in two parts, with room for two numbers for each, and the counts of all
-    /// bins. The room of the first part lies in the index.
+    /// Returns the entries of a crowded unit in three parts, with room for two numbers for each, and the counts of all
+    /// bins.
     #[inline(never)]
-    fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 2], &mut [u32]) {
+    fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 3], &mut [u32]) {
         // A tree has at least one node for every 64 triangles, and `nodes` begins behind its root. A write to later
         // nodes could change bytes behind a small blob.
         let nodes = (self.entries.len() / (WIDTH * LEAF)).saturating_sub(1);
         let nodes = self.nodes.get_mut(self.node_count as usize..nodes).unwrap_or_default();
-        let ys = whole::<u32>(nodes.as_mut_bytes());
         let mut spare = self.spare.as_flattened_mut();
         let entries = self.entries.get_mut(range.clone()).or_bug("a unit behind the entries");
-        let entries = entries.unwrap_or_default();
-        let xs = match self.ids.get_mut(range.clone()) {
-            Some(ids) => ids,
+        let mut entries = entries.unwrap_or_default();
+        let mut ids = self.ids.get_mut(range.start..).unwrap_or_default();
+        let mut xs = if ids.len() >= entries.len() {
+            take(&mut ids, entries.len())
+        } else {
             // Without an index, or in one that is too small, there is no room for ids.
-            None => take(&mut spare, entries.len()),
+            take(&mut spare, entries.len())
         };
-        let middle = ys.len().min(entries.len());
-        debug_assert!(middle + spare.len() >= entries.len(), "no room for the centres of a unit");
-        let (entries, other_entries) = entries.split_at_mut_checked(middle).unwrap_or_default();
-        let (xs, other_xs) = xs.split_at_mut_checked(middle).unwrap_or_default();
-        let one = CrowdPart { entries, xs, ys };
-        ([one, CrowdPart { entries: other_entries, xs: other_xs, ys: spare }], self.counts)
+        let parts = [whole::<u32>(nodes.as_mut_bytes()), ids, spare].map(|ys| {
+            let count = ys.len().min(entries.len());
+            CrowdPart { entries: take(&mut entries, count), xs: take(&mut xs, count), ys }
+        });
+        debug_assert!(entries.is_empty(), "no room for the centres of a unit");
+        (parts, self.counts)
     }
 
     /// Finds the end of the bin at the start of a range.
