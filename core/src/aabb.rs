@@ -3,6 +3,7 @@
 use glam::Vec3A;
 
 use crate::limits::MAX_COORDINATE;
+use crate::simd::inline_unless_small;
 
 /// The smallest box around some points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,13 +16,14 @@ impl Aabb {
     /// The box around nothing.
     pub(crate) const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
 
-    /// The box around a triangle, or `None` if one of its coordinates is not finite.
-    #[inline(always)]
-    pub(crate) fn of([a, b, c]: [Vec3A; 3]) -> Option<Self> {
-        // `<=` fails on NaN, so one comparison refuses all that is not finite.
-        let limit = Vec3A::splat(MAX_COORDINATE);
-        let finite = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
-        finite.all().then(|| Self { min: a.min(b).min(c), max: a.max(b).max(c) })
+    inline_unless_small! {
+        /// The box around a triangle, or `None` if one of its coordinates is not finite.
+        pub(crate) fn of([a, b, c]: [Vec3A; 3]) -> Option<Self> {
+            // `<=` fails on NaN, so one comparison refuses all that is not finite.
+            let limit = Vec3A::splat(MAX_COORDINATE);
+            let finite = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
+            finite.all().then(|| Self { min: a.min(b).min(c), max: a.max(b).max(c) })
+        }
     }
 
     /// Returns the extent on each axis.
@@ -30,10 +32,11 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// The box around two boxes.
-    #[inline(always)]
-    pub(crate) fn union(&self, other: &Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    inline_unless_small! {
+        /// The box around two boxes.
+        pub(crate) fn union(&self, other: &Self) -> Self {
+            Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        }
     }
 
     /// Returns true if it is a finite box with an inside on every axis.

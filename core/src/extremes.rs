@@ -10,8 +10,13 @@ use core::arch::wasm32::{f32x4 as four, f32x4_extract_lane, f32x4_pmax, f32x4_pm
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 
-/// Chooses between the numbers of two vectors, lane by lane. Where one of them is a NaN, the result is either, or a
-/// NaN; with the vectors of x86 and of WebAssembly it is the one of `other`.
+#[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+use crate::aabb::{greater, lesser};
+#[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+use crate::simd::{HAS_VECTORS, inline_unless_small};
+
+/// Chooses between the numbers of two vectors, lane by lane. Where one of them is a NaN, the result is the one of
+/// `other`; with the vectors of Arm it is either, or a NaN.
 pub(crate) trait Extremes {
     fn lesser(self, other: Self) -> Self;
     fn greater(self, other: Self) -> Self;
@@ -24,15 +29,41 @@ macro_rules! implement {
         impl<S: Simd> Extremes for $vector<S> {
             #[inline(always)]
             fn lesser(self, other: Self) -> Self {
-                self.min(other)
+                if HAS_VECTORS {
+                    return self.min(other);
+                }
+                let (simd, mut lanes) = (self.simd, self.into());
+                keep_lesser(&mut lanes, &other.into());
+                Self::simd_from(simd, lanes)
             }
 
             #[inline(always)]
             fn greater(self, other: Self) -> Self {
-                self.max(other)
+                if HAS_VECTORS {
+                    return self.max(other);
+                }
+                let (simd, mut lanes) = (self.simd, self.into());
+                keep_greater(&mut lanes, &other.into());
+                Self::simd_from(simd, lanes)
             }
         }
     )*};
+}
+
+#[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+inline_unless_small! {
+    /// Chooses without vectors. `f32::min` also decides what a NaN gives, and takes three times the code.
+    fn keep_lesser<const N: usize>(lanes: &mut [f32; N], others: &[f32; N]) {
+        for (lane, &other) in lanes.iter_mut().zip(others) {
+            *lane = lesser(*lane, other);
+        }
+    }
+
+    fn keep_greater<const N: usize>(lanes: &mut [f32; N], others: &[f32; N]) {
+        for (lane, &other) in lanes.iter_mut().zip(others) {
+            *lane = greater(*lane, other);
+        }
+    }
 }
 
 /// Vectors of four lanes, and longer ones, which are split in halves.

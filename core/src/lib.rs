@@ -31,8 +31,9 @@
 //!
 //! | layer | modules |
 //! |---|---|
+//! | the machine | `simd` |
 //! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
-//! | helpers | `invariant`, `budget`, `simd`, `extremes`, `tasks`; `random` for tests |
+//! | helpers | `invariant`, `budget`, `extremes`, `tasks`; `random` for tests |
 //! | memory | `arena`, `bits`, `lists`, `fnv`, `survey`, `cell`, `blob`, `bump` |
 //! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |

@@ -92,6 +92,16 @@ impl SimdLevel {
 /// True if the target is a microcontroller, where flash matters more than a few instructions a ray.
 pub(crate) const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
 
+/// Functions that are inlined, except on a microcontroller: there all callers share one copy.
+macro_rules! inline_unless_small {
+    ($($function:item)*) => {$(
+        #[cfg_attr(all(target_os = "none", target_pointer_width = "32"), inline(never))]
+        #[cfg_attr(not(all(target_os = "none", target_pointer_width = "32")), inline(always))]
+        $function
+    )*};
+}
+pub(crate) use inline_unless_small;
+
 /// True if the target has vectors at all. Without them eight or sixteen lanes one after the other
 /// are up to twice the work, much code, and minutes of compilation.
 pub(crate) const HAS_VECTORS: bool = cfg!(any(

@@ -78,9 +78,10 @@ pub(super) const fn bytes(triangles: u32, quality: Quality, tasks: u32) -> (u64,
 }
 
 const fn fast_bound(triangles: u32, tasks: u32) -> (u64, u64) {
+    let nodes = most_nodes(triangles) as u64;
     let triangles = triangles as u64;
     let tasks = if tasks < 1 { 1 } else { tasks } as u64;
-    let index = index_bytes(triangles, most_nodes(triangles), most_fine(triangles));
+    let index = index_bytes(triangles, nodes, most_fine(triangles));
     (index, scratch_bytes(triangles, tasks, triangles))
 }
 
@@ -398,7 +399,7 @@ impl BuildInputs<'_> {
             let entries = take(&mut rest, count);
             let ids = take_up_to(&mut ids, count);
             let room =
-                if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
+                if is_last { rest_of_nodes.len() } else { most_below(count as u32) as usize };
             let nodes = take_up_to(&mut rest_of_nodes, room);
             let room_to_sort = if is_last { spare.len() } else { count };
             let spare = take(&mut spare, room_to_sort);

@@ -11,6 +11,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
+use crate::simd::inline_unless_small;
 
 /// Bits of a key.
 pub(crate) const KEY_BITS: u32 = 30;
@@ -48,15 +49,16 @@ impl Keys {
         self.of_twice(bounds.min + bounds.max)
     }
 
-    /// The key of a box, given min + max.
-    #[inline(always)]
-    pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
-        let cell = (center - self.origin) * self.scale;
-        let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
-        let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
-            .to_array()
-            .map(|cell| spread(cell.to_bits() & CELL_BITS));
-        x << 2 | y << 1 | z
+    inline_unless_small! {
+        /// The key of a box, given min + max.
+        pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
+            let cell = (center - self.origin) * self.scale;
+            let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
+            let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
+                .to_array()
+                .map(|cell| spread(cell.to_bits() & CELL_BITS));
+            x << 2 | y << 1 | z
+        }
     }
 
     /// The keys of eight centres: of each the same as [`of_twice`](Self::of_twice).

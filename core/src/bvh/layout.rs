@@ -63,17 +63,19 @@ const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MO
 /// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost: 0.14625, or
 /// 11.7 bytes. With 4 bytes of ids, 0.16 of late roots and 0.1 of fine sides an index takes less than 16 bytes a
 /// triangle.
-const NODES_PER_TRIANGLE: u64 = 24_570;
+const NODES_PER_TRIANGLE: u32 = 2457;
 /// A multiple of 7 * 24, so that 11/7 nodes for 24 triangles are a whole number of parts.
-const WHOLE: u64 = 168_000;
+const WHOLE: u32 = 16_800;
 
 /// The part of [`NODES_PER_TRIANGLE`] for the nodes below the roots.
-const NODES_PER_TRIANGLE_BELOW: u64 =
-    NODES_PER_TRIANGLE - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u64;
+#[expect(clippy::cast_possible_truncation, reason = "a small constant")]
+const NODES_PER_TRIANGLE_BELOW: u32 =
+    NODES_PER_TRIANGLE - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u32;
 
 /// The most nodes below a root of so many triangles.
 pub(crate) const fn most_of_root(triangles: usize) -> usize {
-    (NODES_PER_TRIANGLE_BELOW * triangles as u64 / WHOLE) as usize
+    debug_assert!(triangles <= MOST_ROOT, "too many triangles for a root");
+    NODES_PER_TRIANGLE_BELOW as usize * triangles / WHOLE as usize
 }
 
 /// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
@@ -105,19 +107,26 @@ pub(crate) const fn bin_bits(triangles: u64) -> u32 {
 }
 
 /// Roots behind crowded bins, at most.
-const fn late_roots(triangles: u64) -> u64 {
-    DIVISIONS as u64 * (triangles / (CROWD as u64 + 1)) + 1
+#[expect(clippy::cast_possible_truncation, reason = "a small constant")]
+const fn late_roots(triangles: u32) -> u32 {
+    DIVISIONS * (triangles / (CROWD as u32 + 1)) + 1
+}
+
+/// So many parts of [`WHOLE`] for each triangle, in sum and rounded up. In 32 bits: a microcontroller divides 64 bits by
+/// calling a function of a kilobyte.
+const fn parts_of(triangles: u32, parts: u32) -> u32 {
+    triangles / WHOLE * parts + (triangles % WHOLE * parts).div_ceil(WHOLE)
 }
 
 /// The most nodes below the roots that hold so many triangles.
-pub(crate) const fn most_below(triangles: u64) -> u64 {
-    (triangles * NODES_PER_TRIANGLE_BELOW).div_ceil(WHOLE)
+pub(crate) const fn most_below(triangles: u32) -> u32 {
+    parts_of(triangles, NODES_PER_TRIANGLE_BELOW)
 }
 
 /// The most nodes of a tree over so many triangles.
-pub(crate) const fn most_nodes(triangles: u64) -> u64 {
+pub(crate) const fn most_nodes(triangles: u32) -> u32 {
     // The root of all is one more.
-    (triangles * NODES_PER_TRIANGLE).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
+    parts_of(triangles, NODES_PER_TRIANGLE) + 11 * late_roots(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids, nodes and fine sides.

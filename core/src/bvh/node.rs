@@ -36,6 +36,12 @@ pub(crate) const SMALL_LEAF: usize = 4;
 /// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one minimum.
 pub(crate) type Sides = [f32; 8];
 
+/// A box as two corners.
+pub(crate) fn corners(sides: &Sides) -> Aabb {
+    let [x, y, z, _, nx, ny, nz, _] = *sides;
+    Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
+}
+
 /// Up to eight children and their boxes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, Immutable, IntoBytes)]

@@ -10,6 +10,7 @@
 
 use super::layout::Entry;
 use crate::invariant::OrBug;
+use crate::simd::inline_unless_small;
 
 /// Few entries are sorted by insertion.
 const FEW: usize = 24;
@@ -38,27 +39,29 @@ pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     }
 }
 
-/// Moves entries to another place, in the order of some bits of their keys.
-fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
-    let mut heads = [0_u16; COUNTS];
-    let mask = (1 << width) - 1;
-    let digit = |entry: &Entry| (entry[0] >> shift & mask) as usize % COUNTS;
-    // Count the entries of each digit.
-    for entry in from {
-        heads[digit(entry)] += 1;
-    }
-    // Sum up the counts: where each digit starts.
-    let mut end = 0;
-    for head in heads.iter_mut().take(mask as usize + 1) {
-        end += core::mem::replace(head, end);
-    }
-    // Move the entries.
-    for entry in from {
-        let head = &mut heads[digit(entry)];
-        if let Some(slot) = to.get_mut(*head as usize).or_bug("a digit has too many entries") {
-            *slot = *entry;
+inline_unless_small! {
+    /// Moves entries to another place, in the order of some bits of their keys.
+    fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
+        let mut heads = [0_u16; COUNTS];
+        let mask = (1 << width) - 1;
+        let digit = |entry: &Entry| (entry[0] >> shift & mask) as usize % COUNTS;
+        // Count the entries of each digit.
+        for entry in from {
+            heads[digit(entry)] += 1;
         }
-        *head = head.wrapping_add(1);
+        // Sum up the counts: where each digit starts.
+        let mut end = 0;
+        for head in heads.iter_mut().take(mask as usize + 1) {
+            end += core::mem::replace(head, end);
+        }
+        // Move the entries.
+        for entry in from {
+            let head = &mut heads[digit(entry)];
+            if let Some(slot) = to.get_mut(*head as usize).or_bug("a digit has too many entries") {
+                *slot = *entry;
+            }
+            *head = head.wrapping_add(1);
+        }
     }
 }
 

@@ -35,10 +35,10 @@ use crate::eight::load;
 use crate::extremes::Extremes;
 use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
-use crate::simd::Kernel;
+use crate::simd::{HAS_VECTORS, Kernel};
 
 use super::layout::{Entry, MOST_ROOT, most_of_root};
-use super::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH};
+use super::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH, corners};
 
 /// Nodes of a subtree, at most, and one to spare.
 const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
@@ -222,10 +222,22 @@ impl Subtree {
         if by == Cut::Halves {
             self.changes = [0; MOST_ROOT];
         }
+        let bits = if HAS_VECTORS { self.find_places(simd) } else { self.find_places_one_by_one() };
+        (self.count, self.id_count) = (1, 0);
+        self.tops[0] = 31;
+        let mut at = 0;
+        while at < self.count {
+            self.cut(at, bits);
+            at += 1;
+        }
+    }
+
+    /// Finds where keys change in each bit. Returns the bits in which any do, as a mask.
+    #[inline(always)]
+    fn find_places<S: Simd>(&mut self, simd: S) -> u32 {
+        let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32)) & !1;
         let [low, high]: [[u8; 64]; 2] = transmute!(self.changes);
         let [low, high] = [u8x64::simd_from(simd, low), u8x64::simd_from(simd, high)];
-        // The numbers that occur in `changes`, as a mask.
-        let bits = self.changes.iter().fold(0_u32, |bits, &bit| bits | 1 << (bit % 32)) & !1;
         let mut rest = bits;
         while rest != 0 {
             let bit = rest.trailing_zeros();
@@ -234,13 +246,20 @@ impl Subtree {
             let [low, high] = [low.simd_eq(number), high.simd_eq(number)].map(SimdMask::to_bitmask);
             self.places[bit as usize % 32] = u128::from(low) | u128::from(high) << 64;
         }
-        (self.count, self.id_count) = (1, 0);
-        self.tops[0] = 31;
-        let mut at = 0;
-        while at < self.count {
-            self.cut(at, bits);
-            at += 1;
+        bits
+    }
+
+    /// Does the same for machines without vectors.
+    #[inline(never)]
+    fn find_places_one_by_one(&mut self) -> u32 {
+        self.places = [0; 32];
+        let (mut bits, mut place) = (0, 1);
+        for &bit in &self.changes {
+            self.places[usize::from(bit % 32)] |= place;
+            bits |= 1 << (bit % 32);
+            place <<= 1;
         }
+        bits & !1
     }
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for each other.
@@ -319,7 +338,15 @@ impl Subtree {
             bounds = bounds.lesser(*sides);
             used += 1;
         }
-        node.set_sides(simd, bounds, &boxes, (1 << used) - 1, least);
+        if HAS_VECTORS {
+            node.set_sides(simd, bounds, &boxes, (1 << used) - 1, least);
+        } else {
+            let mut children = [Aabb::EMPTY; WIDTH];
+            for (child, sides) in children.iter_mut().zip(boxes) {
+                *child = corners(&sides.into());
+            }
+            node.set_boxes(&corners(&bounds.into()), &children, least);
+        }
         node.first += places[0];
         node.child = (node.child + places[1]).wrapping_sub(1);
         if let Some(slot) = self.boxes.get_mut(OF_NODES + at) {
@@ -440,6 +467,7 @@ mod tests {
     use super::*;
     use crate::bvh::layout::most_of_root;
     use crate::bvh::node::Child;
+    use crate::random;
     use crate::simd::{SimdLevel, dispatch};
 
     /// Small triangles, one for each entry.
@@ -509,6 +537,39 @@ mod tests {
                     // Halves are cheap enough for the bound.
                     assert!(subtree.below().len() <= most_of_root(count), "{count} {which}");
                 }
+            }
+        }
+    }
+
+    /// The places where keys change, found with vectors: the bits that change, and the places of each of them.
+    struct Places<'a>(&'a mut Subtree);
+
+    impl Kernel for Places<'_> {
+        type Output = Vec<u128>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Vec<u128> {
+            let bits = self.0.find_places(simd);
+            of_bits(self.0, bits)
+        }
+    }
+
+    fn of_bits(subtree: &Subtree, bits: u32) -> Vec<u128> {
+        let of_bit = |bit: usize| (bits >> bit & 1 == 1).then_some(subtree.places[bit]);
+        (0..32).filter_map(of_bit).chain([bits.into()]).collect()
+    }
+
+    #[test]
+    fn places_are_found_alike_with_vectors_and_without() {
+        let mut state = 1;
+        for most in [1, 2, 9, 31] {
+            let mut subtree = Subtree::new();
+            subtree.changes = [(); MOST_ROOT].map(|()| (random::next(&mut state) % most) as u8);
+            let bits = subtree.find_places_one_by_one();
+            let expected = of_bits(&subtree, bits);
+            for level in SimdLevel::available() {
+                let found = dispatch(level, Places(&mut subtree));
+                assert_eq!(found, expected, "{level:?}, {most}");
             }
         }
     }

@@ -14,6 +14,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::aabb::Aabb;
 use crate::invariant::OrBug;
+use crate::simd::inline_unless_small;
 
 use super::fine::FineList;
 use super::layout::Entry;
@@ -161,9 +162,11 @@ pub(crate) fn build(
     Some(Top { root, count, levels })
 }
 
-fn bounds_of(items: &[RootItem], start: u32, end: u32) -> Aabb {
-    let items = items.get(start as usize..end as usize).or_bug("a part behind the items");
-    items.unwrap_or_default().iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
+inline_unless_small! {
+    fn bounds_of(items: &[RootItem], start: u32, end: u32) -> Aabb {
+        let items = items.get(start as usize..end as usize).or_bug("a part behind the items");
+        items.unwrap_or_default().iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
+    }
 }
 
 /// Cuts a range of items into eight parts, or into single items.

@@ -22,6 +22,7 @@ use crate::aabb::Aabb;
 use crate::error::{Error, MeshField};
 use crate::limits::{MAX_COORDINATE, MAX_TRIANGLES};
 use crate::method::Content;
+use crate::simd::{HAS_VECTORS, inline_unless_small};
 pub use parts::MeshPart;
 pub(crate) use parts::{LastPart, Piece, Reader};
 pub use strided::Strided;
@@ -422,16 +423,17 @@ impl<'a> TriangleMesh<'a> {
         found
     }
 
-    /// The corners of a triangle of a mesh that was not joined, as vectors.
-    #[inline(always)]
-    pub(crate) fn own_corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
-        if let Some([a, b, c]) = self.wide().corners(triangle) {
-            return Some([vector(a), vector(b), vector(c)]);
+    inline_unless_small! {
+        /// The corners of a triangle of a mesh that was not joined, as vectors.
+        pub(crate) fn own_corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
+            if let Some([a, b, c]) = self.wide().corners(triangle) {
+                return Some([vector(a), vector(b), vector(c)]);
+            }
+            // Number by number: an array that becomes a vector costs a detour through memory.
+            let [a, b, c] = self.vertices_of(triangle)?;
+            let read = |vertex| self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z));
+            Some([read(a)?, read(b)?, read(c)?])
         }
-        // Number by number: an array that becomes a vector costs a detour through memory.
-        let [a, b, c] = self.vertices_of(triangle)?;
-        let read = |vertex| self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z));
-        Some([read(a)?, read(b)?, read(c)?])
     }
 
     /// The box of some vertices, used or not: of those whose coordinates are finite and no larger
@@ -450,7 +452,8 @@ impl<'a> TriangleMesh<'a> {
     /// [`vertex_bounds`](Self::vertex_bounds) of a mesh that was not joined.
     fn own_vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
         // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z.
-        let fours = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;
+        let tight = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;
+        let fours = if HAS_VECTORS { tight } else { &[] };
         let mut low = [Vec4::INFINITY; 3];
         let mut high = [Vec4::NEG_INFINITY; 3];
         let mut bounds = Aabb::EMPTY;

@@ -16,6 +16,7 @@ use crate::bvh::node::Sides;
 use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 use crate::invariant::OrBug;
+use crate::simd::inline_unless_small;
 
 /// A triangle during a build, as bits: the least corner of its box, its id, the negated greatest corner, 0.
 pub(super) type TriangleItem = [u32; 8];
@@ -36,17 +37,18 @@ pub(super) struct Extent {
 impl Extent {
     pub(super) const NOTHING: Self = Self { bounds: NOTHING, centers: NOTHING };
 
-    /// The extent of some triangles.
-    #[inline(always)]
-    pub(super) fn of<S: Simd>(simd: S, items: &[TriangleItem]) -> Self {
-        let mut bounds = f32x8::splat(simd, f32::INFINITY);
-        let mut centers = bounds;
-        for item in items {
-            let sides = load(simd, item);
-            bounds = bounds.lesser(sides);
-            centers = centers.lesser(center(sides));
+    inline_unless_small! {
+        /// The extent of some triangles.
+        pub(super) fn of<S: Simd>(simd: S, items: &[TriangleItem]) -> Self {
+            let mut bounds = f32x8::splat(simd, f32::INFINITY);
+            let mut centers = bounds;
+            for item in items {
+                let sides = load(simd, item);
+                bounds = bounds.lesser(sides);
+                centers = centers.lesser(center(sides));
+            }
+            Self { bounds: bounds.into(), centers: centers.into() }
         }
-        Self { bounds: bounds.into(), centers: centers.into() }
     }
 }
 

@@ -11,14 +11,13 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
-use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, TriangleItem, area};
 use crate::aabb::Aabb;
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
-use crate::bvh::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH};
+use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH, corners};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
@@ -98,12 +97,6 @@ impl SubRange {
     }
 }
 
-/// A box as two corners.
-fn corners(sides: &Sides) -> Aabb {
-    let [x, y, z, _, nx, ny, nz, _] = *sides;
-    Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
-}
-
 impl Kernel for Grow<'_, '_> {
     type Output = Grown;
 
@@ -169,10 +162,11 @@ impl Kernel for Grow<'_, '_> {
                     }
                 }
             }
-            // The first child comes next.
-            let pushed = stack.get_mut(jobs_before..jobs);
-            if let Some(pushed) = pushed.or_bug("jobs that do not wait") {
-                pushed.reverse();
+            // Reverse them, so that the first child comes next. `reverse` would take 400 bytes of flash.
+            let mut pushed = stack.get_mut(jobs_before..jobs).unwrap_or_default();
+            while let [first, between @ .., last] = pushed {
+                core::mem::swap(first, last);
+                pushed = between;
             }
             // Quantise the boxes, and write the node.
             node.set_boxes(&bounds, &boxes, self.least);
@@ -239,7 +233,7 @@ impl Grow<'_, '_> {
             parts[at] =
                 SubRange { start: part.start, end: middle, extent: first, area: area(&first) };
             for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
-                core::mem::swap(slot, &mut next);
+                next = core::mem::replace(slot, next);
             }
         }
         parts

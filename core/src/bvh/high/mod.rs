@@ -51,17 +51,18 @@ use cut::TriangleItem;
 use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
 /// The most nodes of a tree over so many triangles.
-const fn most_high_nodes(triangles: u64) -> u64 {
+const fn most_high_nodes(triangles: u32) -> u32 {
     let nodes = triangles.saturating_sub(2) / 7;
     if nodes < 1 { 1 } else { nodes }
 }
 
 /// The memory that any mesh with so many triangles needs, for a build with any number of tasks.
 pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
+    let nodes = most_high_nodes(triangles) as u64;
     let triangles = triangles as u64;
     // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
-    let index = index_bytes(triangles, most_high_nodes(triangles), most_fine(triangles));
+    let index = index_bytes(triangles, nodes, most_fine(triangles));
     let scratch = section_bytes::<TriangleItem>(items);
     (index, scratch + section_bytes::<FineSides>(most_fine(triangles)))
 }
@@ -258,7 +259,7 @@ impl Ranges {
             all.count += 1;
             all.end = waiter.end;
             all.triangles += triangles;
-            all.nodes += most_high_nodes(triangles.into()) as u32 - 1;
+            all.nodes += most_high_nodes(triangles) - 1;
         }
         all
     }
