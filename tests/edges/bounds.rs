@@ -106,7 +106,7 @@ fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
 
 /// Returns the most nodes that a tree can have, rounded up (core/src/bvh/layout.rs).
 fn tree_nodes(triangles: u64) -> u64 {
-    triangles * 24_570 / 168_000 + 11 * (5 * (triangles / 4097) + 1) / 7 + 4
+    triangles * 2457 / 16_800 + 11 * (5 * (triangles / 4097) + 1) / 7 + 4
 }
 
 #[test]

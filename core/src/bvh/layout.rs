@@ -112,8 +112,8 @@ const fn late_roots(triangles: u32) -> u32 {
     DIVISIONS * (triangles / (CROWD as u32 + 1)) + 1
 }
 
-/// So many parts of [`WHOLE`] for each triangle, in sum and rounded up. In 32 bits: a microcontroller divides 64 bits by
-/// calling a function of a kilobyte.
+/// So many parts of [`WHOLE`] for each triangle, in sum and rounded up. Computed in 32 bits: to divide 64, a
+/// microcontroller calls a function of a kilobyte.
 const fn parts_of(triangles: u32, parts: u32) -> u32 {
     triangles / WHOLE * parts + (triangles % WHOLE * parts).div_ceil(WHOLE)
 }
@@ -152,4 +152,21 @@ pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, spare: u64) -> u64
 /// Entries of the `spare` of a single task, as long as no bin is crowded.
 pub(crate) const fn small_spare(triangles: u64) -> u64 {
     if (MOST_UNIT as u64) < triangles { MOST_UNIT as u64 } else { triangles }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_those_of_all_triangles_at_once() {
+        let whole = [1, 2, 127, 255_652].map(|wholes| wholes * WHOLE);
+        let near = whole.iter().flat_map(|&triangles| [triangles - 1, triangles, triangles + 1]);
+        for triangles in near.chain([0, 1, 9, 4097, 1 << 31, u32::MAX]) {
+            for parts in [NODES_PER_TRIANGLE, NODES_PER_TRIANGLE_BELOW] {
+                let all = (u64::from(triangles) * u64::from(parts)).div_ceil(WHOLE.into());
+                assert_eq!(u64::from(parts_of(triangles, parts)), all, "{triangles}");
+            }
+        }
+    }
 }

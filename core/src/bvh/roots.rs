@@ -10,10 +10,10 @@
 //! spare   | centres of a crowded unit, then second buffer of the sorts | untouched |
 //! ```
 //!
-//! Two of the three numbers of each centre of a crowded unit are stored in places that the build writes later in any
-//! case: one where the ids of the unit will be; the other where nodes will be, as many as any tree over the triangles
-//! has, and where the ids of later units will be. What has no room there is stored in `spare`. Once the entries have new keys, no centre is needed any more, and the same memory is the second
-//! buffer when they are sorted by bins.
+//! Two of the three numbers of each centre of a crowded unit are stored in memory that the build writes later in any
+//! case. One number lies where the id will be. The other lies where nodes will be, as many as any tree over the
+//! triangles has; then where the ids of later units will be; then in `spare`. Once the entries have new keys, no centre
+//! is needed any more, and the same memory is the second buffer when they are sorted by bins.
 //!
 //! The record of a root is 112 bytes, written over entries that were used up:
 //! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
@@ -245,7 +245,7 @@ impl Roots<'_> {
     }
 
     /// Returns the entries of a crowded unit in three parts, with room for two numbers for each, and the counts of all
-    /// bins.
+    /// bins. The room of the parts is where nodes will be, where later ids will be, and in `spare`.
     #[inline(never)]
     fn crowd(&mut self, range: &Range<usize>) -> ([CrowdPart<'_>; 3], &mut [u32]) {
         // A tree has at least one node for every 64 triangles, and `nodes` begins behind its root. A write to later
