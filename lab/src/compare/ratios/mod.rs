@@ -9,6 +9,7 @@ mod entry;
 use hgrid_core::Method;
 use serde::Serialize;
 
+use super::grid::HIGH;
 use super::mode::Mode;
 use super::numbers::{Kind, SystemNumbers};
 use super::peers::Peer;
@@ -72,11 +73,17 @@ impl Ratio {
 /// Compares builds, first images and bytes.
 fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
     let best = |kind| least(peers.iter().filter_map(|peer| Entry::image(peer, kind)));
+    // Quality `high` is for scenes that are traced for long, as MEDIUM is.
+    let (quality, builders) = if hgrid.system.ends_with(HIGH) {
+        ("MEDIUM", [Peer::EmbreeMedium].as_slice())
+    } else {
+        ("LOW", [Peer::EmbreeLow, Peer::EmbreeDynamic].as_slice())
+    };
     let build = |kind, words| {
-        let low = [Peer::EmbreeLow, Peer::EmbreeDynamic].into_iter();
-        let low = least(low.filter_map(|peer| Some(Entry::build(find(peers, peer)?, kind))))?;
-        let what = format!("build / {} LOW: {words}", library(low.system));
-        Ratio::new(what, &Entry::build(hgrid, kind), &low)
+        let entry = |&peer: &Peer| Some(Entry::build(find(peers, peer)?, kind));
+        let theirs = least(builders.iter().filter_map(entry))?;
+        let what = format!("build / {} {quality}: {words}", library(theirs.system));
+        Ratio::new(what, &Entry::build(hgrid, kind), &theirs)
     };
     let image = |kind, words| {
         let what = format!("time to image / best peer: {words}");
@@ -186,7 +193,8 @@ mod tests {
             let samples: Vec<_> = rebuilds.iter().map(|seconds| factor * seconds).collect();
             Build { seconds: median(&samples), samples, page_faults: None }
         };
-        let is_peer = Method::ALL.iter().all(|method| method.name() != name);
+        let of_any_quality = name.strip_suffix(HIGH).unwrap_or(name);
+        let is_peer = Method::ALL.iter().all(|method| method.name() != of_any_quality);
         SystemNumbers {
             system: name.to_owned(),
             version: name.starts_with("embree").then(|| "Embree 3.13.5".to_owned()),
@@ -278,5 +286,15 @@ mod tests {
         is("random", [&with("batch"), "embree-low, packet8"], 1.5);
         assert!(ratios.iter().all(|ratio| !ratio.what.contains("bounces")));
         assert!(Ratio::all(&systems[2..]).is_empty() && Ratio::all(&systems[..2]).is_empty());
+    }
+
+    #[test]
+    fn a_tree_of_high_quality_is_compared_with_builds_of_medium() {
+        let name = format!("{}{HIGH}", Method::default().name());
+        let systems = [(&*name, 2.0), ("embree-low", 1.0), ("embree-medium", 5.0)]
+            .map(|(name, seconds)| system(name, &[seconds], &[]));
+        let ratios = Ratio::all(&systems);
+        assert!((of(&ratios, "build / Embree 3.13.5 MEDIUM: rebuild").ratio - 0.4).abs() < 1e-9);
+        assert!(ratios.iter().all(|ratio| !ratio.what.contains("LOW")));
     }
 }
