@@ -268,8 +268,8 @@ fn partition<S: Simd>(
     (middle, [first, second])
 }
 
-/// Returns the one item, or the other if `is_one` is false. With vectors in a register: arrays would go through memory,
-/// which takes a third of the build.
+/// Returns the one item, or the other if `is_one` is false. With vectors it chooses in a register: between arrays the
+/// compiler chooses in memory, and the next items wait for it.
 #[inline(always)]
 fn either<S: Simd>(simd: S, is_one: bool, one: TriangleItem, other: TriangleItem) -> TriangleItem {
     if !HAS_VECTORS {
