@@ -377,11 +377,10 @@
 /**
  * The quality of a tree that is built with SAH at every node, down to single triangles.
  *
- * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
- * architecture. Rays are answered sooner and the index is smaller; the build takes several times as
- * long. It takes about 32 bytes of scratch a triangle, whatever the number of tasks:
- * `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
- * other quality, and the blob has the same format.
+ * Choose it for a scene that is traced for long. Most rays are answered sooner and the index is smaller; the build
+ * takes several times as long. Measure it in architecture, where some rays take longer. It takes about 32 bytes of
+ * scratch a triangle, whatever the number of tasks: `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for
+ * it. All queries answer as with the other quality, and the blob has the same format.
  */
 #define HGRID_QUALITY_HIGH 1
 
