@@ -296,7 +296,7 @@ enum class coherence : std::uint32_t {
 enum class quality : std::uint32_t {
     /// The shortest build: `HGRID_QUALITY_FAST`
     fast = HGRID_QUALITY_FAST,
-    /// The fastest rays: `HGRID_QUALITY_HIGH`
+    /// A longer build, after which most rays are faster: `HGRID_QUALITY_HIGH`
     high = HGRID_QUALITY_HIGH,
 };
 

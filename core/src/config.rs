@@ -59,7 +59,7 @@ pub enum Parameters {
     },
     /// Parameters of [`Method::Bvh`].
     Bvh {
-        /// A higher quality takes a longer build and makes rays faster.
+        /// A higher quality takes a longer build and makes most rays faster.
         quality: Quality,
     },
 }

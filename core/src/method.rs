@@ -75,7 +75,7 @@ impl Method {
     }
 }
 
-/// The quality of a tree ([`Method::Bvh`]): a higher quality takes a longer build and makes rays faster.
+/// The quality of a tree ([`Method::Bvh`]): a higher quality takes a longer build and makes most rays faster.
 ///
 /// Trees of both qualities have the same format, and the same rays have the same hits.
 #[non_exhaustive]
@@ -85,7 +85,8 @@ pub enum Quality {
     /// Triangles are binned by centre, and SAH chooses the nodes above small groups of them: the shortest build.
     #[default]
     Fast = 0,
-    /// SAH chooses every node, each triangle on its own: for scenes that are traced for long.
+    /// SAH chooses every node, each triangle on its own: for scenes that are traced for long. Measure it in
+    /// architecture, where some rays take longer.
     High = 1,
 }
 

@@ -451,8 +451,8 @@ impl<'a> TriangleMesh<'a> {
 
     /// [`vertex_bounds`](Self::vertex_bounds) of a mesh that was not joined.
     fn own_vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
-        // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z. Without vectors that would
-        // only be more code.
+        // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z. Without vectors of the
+        // machine that would only be more code.
         let tight = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;
         let fours = if HAS_VECTORS { tight } else { &[] };
         let mut low = [Vec4::INFINITY; 3];

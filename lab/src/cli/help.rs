@@ -24,7 +24,7 @@ Examples:
   hgrid bunny.ply+stadium.ply                the first in the middle of the second
   hgrid render stadium.ply --view 40,15      from the right, a little above
   hgrid render sponza.ply --eye 0,3,0 --target 10,3,0 --fov 60
-  hgrid render bunny.ply --quality high      a longer build, rays that are faster
+  hgrid render bunny.ply --quality high      a longer build, most rays are faster
   hgrid render bunny.ply --method fixed --macrocell-factor 4
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render bunny.ply --json              the numbers, for programs

@@ -162,7 +162,7 @@ impl Kernel for Grow<'_, '_> {
                     }
                 }
             }
-            // Reverse them, so that the first child comes next. `reverse` would take 400 bytes of flash.
+            // Reverse them, so that the first child comes next. `reverse` is unrolled, which takes more flash.
             let pushed = stack.get_mut(jobs_before..jobs).or_bug("jobs that do not wait");
             let mut pushed = pushed.unwrap_or_default();
             while let [first, between @ .., last] = pushed {
