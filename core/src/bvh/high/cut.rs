@@ -56,24 +56,40 @@ impl Extent {
 const MOST_BINS: usize = 32;
 
 /// The bins of a range on each axis.
+#[repr(C, align(32))]
 pub(super) struct Bins {
+    /// Keeps the boxes off multiples of 16 bytes, where items lie: some processors (Zen 4) let the load of an item
+    /// wait for a store to a box if their addresses differ by a multiple of 4096.
+    _off: [u32; 2],
     boxes: [[Sides; MOST_BINS]; 3],
     counts: [[u32; MOST_BINS]; 3],
 }
 
+/// An item in a vector.
+#[inline(always)]
+fn wide<S: Simd>(simd: S, item: &TriangleItem) -> u32x8<S> {
+    u32x8::simd_from(simd, *item)
+}
+
 /// The box of an item without its id, which may be a denormal number: these are slow.
 #[inline(always)]
-fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
+fn sides_of<S: Simd>(simd: S, item: u32x8<S>) -> f32x8<S> {
     let word = u32::MAX;
     let mask = u32x8::simd_from(simd, [word, word, word, 0, word, word, word, 0]);
-    (u32x8::simd_from(simd, *item) & mask).bitcast()
+    (item & mask).bitcast()
+}
+
+/// The box of an item.
+#[inline(always)]
+fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
+    sides_of(simd, wide(simd, item))
 }
 
 /// Twice the centre of a box, and minus that.
 #[inline(always)]
 fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     let (low, high) = sides.split();
-    (low - high).combine(high - low)
+    sides - high.combine(low)
 }
 
 /// Half the surface of a box whose lengths are multiplied by `scale`.
@@ -142,17 +158,35 @@ const fn bin(place: f32) -> usize {
     place.to_bits() as usize % MOST_BINS
 }
 
-/// A split of a range: bins of an axis from this one on are the second part.
-#[derive(Clone, Copy)]
-struct Split {
-    axis: usize,
-    bin: usize,
-    cost: f32,
+/// A split of a range: the bins of an axis from one on are the second part.
+///
+/// The upper half is the cost as bits, and below are the axis and how much the bin lacks to 255. So the least of all is
+/// that of least cost, of equal ones that of the first axis, then of the last bin; and there is no branch to predict.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Split(u64);
+
+impl Split {
+    /// Greater than all of finite cost, and less than those whose cost is NaN.
+    const NONE: Self = Self((f32::INFINITY.to_bits() as u64) << 32);
+
+    /// `cost` is not negative, or NaN.
+    #[inline(always)]
+    fn new(axis: usize, bin: usize, cost: f32) -> Self {
+        Self(u64::from(cost.to_bits()) << 32 | (axis << 8 | (0xff - bin)) as u64)
+    }
+
+    fn axis(self) -> usize {
+        (self.0 >> 8 & 0xff) as usize % 3
+    }
+
+    fn bin(self) -> usize {
+        0xff - (self.0 & 0xff) as usize
+    }
 }
 
 impl Bins {
     pub(super) const fn new() -> Self {
-        Self { boxes: [[NOTHING; MOST_BINS]; 3], counts: [[0; MOST_BINS]; 3] }
+        Self { _off: [0; 2], boxes: [[NOTHING; MOST_BINS]; 3], counts: [[0; MOST_BINS]; 3] }
     }
 
     /// Cuts some items in two and returns how many are in the first part, and the extents of both; `None` if no bins
@@ -169,8 +203,8 @@ impl Bins {
         self.fill(simd, items, &rule);
         let place = self.best(simd, &rule, scale)?;
         let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
-        for (at, bin) in self.boxes[place.axis % 3].iter().enumerate().take(rule.count) {
-            let side = &mut bounds[usize::from(at >= place.bin)];
+        for (at, bin) in self.boxes[place.axis()].iter().enumerate().take(rule.count) {
+            let side = &mut bounds[usize::from(at >= place.bin())];
             *side = side.lesser(f32x8::simd_from(simd, *bin));
         }
         let (middle, [first, second]) = partition(simd, items, &rule, &place);
@@ -205,19 +239,17 @@ impl Bins {
     #[inline(always)]
     fn best<S: Simd>(&self, simd: S, rule: &BinScale, scale: f32) -> Option<Split> {
         debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
-        let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
+        let mut best = Split::NONE;
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
             if rule.scale[axis % 3] >= f32::MAX {
                 continue;
             }
-            // Costs of what is before each bin; infinite where nothing is.
-            let mut costs = [f32::INFINITY; MOST_BINS];
+            // Costs of what is before each bin; NaN where nothing is, infinity times zero.
+            let mut costs = [f32::NAN; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             let bins = boxes.iter().zip(counts).take(rule.count);
             for ((bin, counted), cost) in bins.zip(&mut costs) {
-                if sum > 0 {
-                    *cost = area(simd, all, scale) * as_cost(sum);
-                }
+                *cost = area(simd, all, scale) * as_cost(sum);
                 all = all.lesser(f32x8::simd_from(simd, *bin));
                 sum += counted;
             }
@@ -229,12 +261,10 @@ impl Bins {
                 all = all.lesser(f32x8::simd_from(simd, *bounds));
                 sum += counted;
                 let cost = before + area(simd, all, scale) * as_cost(sum);
-                if sum > 0 && cost < best.cost {
-                    best = Split { axis, bin, cost };
-                }
+                best = best.min(Split::new(axis, bin, cost));
             }
         }
-        (best.cost < f32::INFINITY).then_some(best)
+        (best < Split::NONE).then_some(best)
     }
 }
 
@@ -247,36 +277,47 @@ fn partition<S: Simd>(
     cut: &Split,
 ) -> (usize, [f32x8<S>; 2]) {
     let nothing = f32x8::splat(simd, f32::INFINITY);
-    let (mut first, mut second, mut middle) = (nothing, nothing, 0);
+    let (mut centers, mut middle) = ([nothing; 2], 0);
+    // The first item behind the first part.
+    let mut other = wide(simd, items.first().unwrap_or(&[0; 8]));
     for at in 0..items.len() {
         debug_assert!(middle <= at, "more items in the first part than were looked at");
-        let (Some(&item), Some(&other)) = (items.get(at), items.get(middle)) else { break };
+        let Some(item) = items.get(at) else { break };
+        let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
+        let item = wide(simd, item);
+        let center = center(sides_of(simd, item));
+        if !HAS_VECTORS {
+            let side = &mut centers[usize::from(!is_first)];
+            *side = side.lesser(center);
+            if is_first {
+                put(items, at, other);
+                put(items, middle, item);
+                middle += 1;
+                other = wide(simd, items.get(middle).unwrap_or(&[0; 8]));
+            }
+            continue;
+        }
         // No branch: the side of an item is unpredictable.
-        let is_first = rule.bin_of(&item, cut.axis) < cut.bin;
         let mask = mask32x8::splat(simd, is_first);
-        let center = center(load(simd, &item));
-        first = first.lesser(mask.select(center, nothing));
-        second = second.lesser(mask.select(nothing, center));
-        if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
-            *slot = either(simd, is_first, other, item);
-        }
-        if let Some(slot) = items.get_mut(middle).or_bug("a place behind the items") {
-            *slot = either(simd, is_first, item, other);
-        }
+        centers[0] = centers[0].lesser(mask.select(center, nothing));
+        centers[1] = centers[1].lesser(mask.select(nothing, center));
+        put(items, at, mask.select(other, item));
+        put(items, middle, mask.select(item, other));
+        // Keep `other` in a register. Loaded again from the place where it was just stored, it would make each item
+        // wait for the one before.
+        let next = wide(simd, items.get(middle + 1).unwrap_or(&[0; 8]));
+        other = mask.select(next, other);
         middle += usize::from(is_first);
     }
-    (middle, [first, second])
+    (middle, centers)
 }
 
-/// Returns the one item, or the other if `is_one` is false. With vectors it chooses in a register: between arrays the
-/// compiler chooses in memory, and the next items wait for it.
+/// Stores an item.
 #[inline(always)]
-fn either<S: Simd>(simd: S, is_one: bool, one: TriangleItem, other: TriangleItem) -> TriangleItem {
-    if !HAS_VECTORS {
-        return if is_one { one } else { other };
+fn put<S: Simd>(items: &mut [TriangleItem], at: usize, item: u32x8<S>) {
+    if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
+        *slot = item.into();
     }
-    let [one, other] = [u32x8::simd_from(simd, one), u32x8::simd_from(simd, other)];
-    mask32x8::splat(simd, is_one).select(one, other).into()
 }
 
 /// Bins of each axis for so many items.
