@@ -128,7 +128,7 @@ impl Roots<'_> {
             let (Some(entries), Some(spare)) = (entries, spare) else { return };
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
-            sort(entries, spare, (32 - differing.leading_zeros()).max(shift));
+            sort(self.level, entries, spare, (32 - differing.leading_zeros()).max(shift));
         }
         self.cut(range);
     }

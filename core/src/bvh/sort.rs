@@ -8,9 +8,12 @@
 //!
 //! All keys of a bin share their high bits, so only the low ones are sorted by.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, u16x8};
+
 use super::layout::Entry;
 use crate::invariant::OrBug;
-use crate::simd::inline_unless_small;
+use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch, inline_unless_small};
 
 /// Few entries are sorted by insertion.
 const FEW: usize = 24;
@@ -21,7 +24,7 @@ const COUNTS: usize = 1 << PASS_BITS;
 /// Sorts entries by the lowest `bits` bits of their keys; the others are the same in all. Equal keys
 /// keep their order. `spare` has room for as many entries.
 #[inline(never)]
-pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
+pub(crate) fn sort(level: SimdLevel, entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     if entries.len() <= FEW {
         insert(entries);
         return;
@@ -33,15 +36,15 @@ pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     let mut shift = 0;
     for _ in 0..passes / 2 {
         let width = bits.div_ceil(passes).min(PASS_BITS);
-        pass(entries, spare, shift, width);
-        pass(spare, entries, shift + width, width);
+        pass(level, entries, spare, shift, width);
+        pass(level, spare, entries, shift + width, width);
         shift += 2 * width;
     }
 }
 
 inline_unless_small! {
     /// Moves entries to another place, in the order of some bits of their keys.
-    fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
+    fn pass(level: SimdLevel, from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
         let mut heads = [0_u16; COUNTS];
         let mask = (1 << width) - 1;
         let digit = |entry: &Entry| (entry[0] >> shift & mask) as usize % COUNTS;
@@ -50,10 +53,7 @@ inline_unless_small! {
             heads[digit(entry)] += 1;
         }
         // Sum up the counts: where each digit starts.
-        let mut end = 0;
-        for head in heads.iter_mut().take(mask as usize + 1) {
-            end += core::mem::replace(head, end);
-        }
+        dispatch(level, Sums(&mut heads, 1 << width));
         // Move the entries.
         for entry in from {
             let head = &mut heads[digit(entry)];
@@ -61,6 +61,35 @@ inline_unless_small! {
                 *slot = *entry;
             }
             *head = head.wrapping_add(1);
+        }
+    }
+}
+
+/// Turns the counts of so many digits into sums: of each what is before it.
+struct Sums<'a>(&'a mut [u16; COUNTS], usize);
+
+impl Kernel for Sums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self(heads, digits) = self;
+        if !HAS_VECTORS {
+            let mut end = 0;
+            for head in heads.iter_mut().take(digits) {
+                end += core::mem::replace(head, end);
+            }
+            return;
+        }
+        let none = u16x8::splat(simd, 0);
+        let mut end = none;
+        for eight in heads.as_chunks_mut::<8>().0.iter_mut().take(digits.div_ceil(8)) {
+            let counts = u16x8::simd_from(simd, *eight);
+            let mut sums = counts + simd.slide_u16x8::<7>(none, counts);
+            sums = sums + simd.slide_u16x8::<6>(none, sums);
+            sums = sums + simd.slide_u16x8::<4>(none, sums);
+            *eight = (end + (sums - counts)).into();
+            end = end + u16x8::splat(simd, sums[7]);
         }
     }
 }
@@ -93,7 +122,7 @@ mod tests {
         let mut state = 1_u32;
         for count in [0, 1, 2, 23, 24, 25, 100, 4096] {
             for bits in [12, 15, 18, 30] {
-                let mut entries: Vec<Entry> = (0..count)
+                let entries: Vec<Entry> = (0..count)
                     .map(|id| {
                         // Few different keys, so that many are equal; and the same bits above.
                         [
@@ -107,8 +136,11 @@ mod tests {
                 let mut expected = entries.clone();
                 expected.sort_by_key(|entry| entry[0]);
                 let mut spare = entries.clone();
-                sort(&mut entries, &mut spare, bits);
-                assert_eq!(entries, expected, "{count} {bits}");
+                for level in SimdLevel::available() {
+                    let mut sorted = entries.clone();
+                    sort(level, &mut sorted, &mut spare, bits);
+                    assert_eq!(sorted, expected, "{count} {bits} {level:?}");
+                }
             }
         }
     }
