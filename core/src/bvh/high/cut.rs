@@ -204,8 +204,7 @@ impl Bins {
         let place = self.best(simd, &rule, scale)?;
         let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
         for (at, bin) in self.boxes[place.axis()].iter().enumerate().take(rule.count) {
-            let side = &mut bounds[usize::from(at >= place.bin())];
-            *side = side.lesser(f32x8::simd_from(simd, *bin));
+            grow(simd, &mut bounds, at < place.bin(), f32x8::simd_from(simd, *bin));
         }
         let (middle, [first, second]) = partition(simd, items, &rule, &place);
         let [a, b] = bounds;
@@ -286,9 +285,8 @@ fn partition<S: Simd>(
         let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
         let item = wide(simd, item);
         let center = center(sides_of(simd, item));
+        grow(simd, &mut centers, is_first, center);
         if !HAS_VECTORS {
-            let side = &mut centers[usize::from(!is_first)];
-            *side = side.lesser(center);
             if is_first {
                 put(items, at, other);
                 put(items, middle, item);
@@ -299,8 +297,6 @@ fn partition<S: Simd>(
         }
         // No branch: the side of an item is unpredictable.
         let mask = mask32x8::splat(simd, is_first);
-        centers[0] = centers[0].lesser(mask.select(center, nothing));
-        centers[1] = centers[1].lesser(mask.select(nothing, center));
         put(items, at, mask.select(other, item));
         put(items, middle, mask.select(item, other));
         // Keep `other` in a register. Loaded again from the place where it was just stored, it would make each item
@@ -310,6 +306,19 @@ fn partition<S: Simd>(
         middle += usize::from(is_first);
     }
     (middle, centers)
+}
+
+/// Grows the first or the second of two boxes. With vectors both stay in registers.
+#[inline(always)]
+fn grow<S: Simd>(simd: S, boxes: &mut [f32x8<S>; 2], is_first: bool, by: f32x8<S>) {
+    if !HAS_VECTORS {
+        let side = &mut boxes[usize::from(!is_first)];
+        *side = side.lesser(by);
+        return;
+    }
+    let (mask, nothing) = (mask32x8::splat(simd, is_first), f32x8::splat(simd, f32::INFINITY));
+    boxes[0] = boxes[0].lesser(mask.select(by, nothing));
+    boxes[1] = boxes[1].lesser(mask.select(nothing, by));
 }
 
 /// Stores an item.
