@@ -11,7 +11,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u16x8};
 
-use super::layout::Entry;
+use super::layout::{Entry, MOST_UNIT};
 use crate::invariant::OrBug;
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch, inline_unless_small};
 
@@ -21,8 +21,10 @@ const FEW: usize = 24;
 const PASS_BITS: u32 = 9;
 const COUNTS: usize = 1 << PASS_BITS;
 
+const _: () = assert!(MOST_UNIT <= u16::MAX as usize, "a count has sixteen bits");
+
 /// Sorts entries by the lowest `bits` bits of their keys; the others are the same in all. Equal keys
-/// keep their order. `spare` has room for as many entries.
+/// keep their order. There are no more than [`MOST_UNIT`] entries, and `spare` has room for as many.
 #[inline(never)]
 pub(crate) fn sort(level: SimdLevel, entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     if entries.len() <= FEW {
@@ -65,7 +67,7 @@ inline_unless_small! {
     }
 }
 
-/// Turns the counts of so many digits into sums: of each what is before it.
+/// Turns counts of digits into places, so many of them: each is the sum of all counts before it.
 struct Sums<'a>(&'a mut [u16; COUNTS], usize);
 
 impl Kernel for Sums<'_> {
@@ -86,10 +88,10 @@ impl Kernel for Sums<'_> {
         for eight in heads.as_chunks_mut::<8>().0.iter_mut().take(digits.div_ceil(8)) {
             let counts = u16x8::simd_from(simd, *eight);
             let mut sums = counts + simd.slide_u16x8::<7>(none, counts);
-            sums = sums + simd.slide_u16x8::<6>(none, sums);
-            sums = sums + simd.slide_u16x8::<4>(none, sums);
+            sums += simd.slide_u16x8::<6>(none, sums);
+            sums += simd.slide_u16x8::<4>(none, sums);
             *eight = (end + (sums - counts)).into();
-            end = end + u16x8::splat(simd, sums[7]);
+            end += u16x8::splat(simd, sums[7]);
         }
     }
 }
@@ -120,8 +122,8 @@ mod tests {
     #[test]
     fn entries_are_in_the_order_of_their_keys_and_then_as_they_were() {
         let mut state = 1_u32;
-        for count in [0, 1, 2, 23, 24, 25, 100, 4096] {
-            for bits in [12, 15, 18, 30] {
+        for count in [0, 1, 2, 23, 24, 25, 100, u32::try_from(MOST_UNIT).unwrap()] {
+            for bits in [1, 4, 12, 15, 18, 30] {
                 let entries: Vec<Entry> = (0..count)
                     .map(|id| {
                         // Few different keys, so that many are equal; and the same bits above.

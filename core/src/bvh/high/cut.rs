@@ -55,11 +55,13 @@ impl Extent {
 /// Bins of an axis, at most.
 const MOST_BINS: usize = 32;
 
+const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
+
 /// The bins of a range on each axis.
 #[repr(C, align(32))]
 pub(super) struct Bins {
-    /// Keeps the boxes off multiples of 16 bytes, where items lie: some processors (Zen 4) let the load of an item
-    /// wait for a store to a box if their addresses differ by a multiple of 4096.
+    /// With the alignment, this keeps the boxes off multiples of 16 bytes, where items lie. Some processors (Zen 4) let
+    /// the load of an item wait for a store to a box if their addresses differ by a multiple of 4096.
     _off: [u32; 2],
     boxes: [[Sides; MOST_BINS]; 3],
     counts: [[u32; MOST_BINS]; 3],
@@ -160,18 +162,20 @@ const fn bin(place: f32) -> usize {
 
 /// A split of a range: the bins of an axis from one on are the second part.
 ///
-/// The upper half is the cost as bits, and below are the axis and how much the bin lacks to 255. So the least of all is
-/// that of least cost, of equal ones that of the first axis, then of the last bin; and there is no branch to predict.
+/// One number, so that the least can be found without a branch: the bits of the cost, then the axis, then 255 minus the
+/// bin. Among equal costs the first axis is less, then the last bin.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Split(u64);
 
 impl Split {
-    /// Greater than all of finite cost, and less than those whose cost is NaN.
+    /// Greater than any split of finite cost, and less than one whose cost is infinite or NaN.
     const NONE: Self = Self((f32::INFINITY.to_bits() as u64) << 32);
 
-    /// `cost` is not negative, or NaN.
+    /// Makes a split. A cost without a sign is in the order of its bits; only a NaN may have one. Areas have none, not
+    /// even -0: they sum up products of three numbers in pairs, of which not all are negative.
     #[inline(always)]
     fn new(axis: usize, bin: usize, cost: f32) -> Self {
+        debug_assert!(cost.is_nan() || cost.is_sign_positive(), "a cost with a sign");
         Self(u64::from(cost.to_bits()) << 32 | (axis << 8 | (0xff - bin)) as u64)
     }
 
@@ -243,7 +247,8 @@ impl Bins {
             if rule.scale[axis % 3] >= f32::MAX {
                 continue;
             }
-            // Costs of what is before each bin; NaN where nothing is, infinity times zero.
+            // Find the costs of what is before each bin. The cost of nothing is infinity times zero, which is NaN; no
+            // split with it is less than `NONE`.
             let mut costs = [f32::NAN; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             let bins = boxes.iter().zip(counts).take(rule.count);
@@ -252,7 +257,7 @@ impl Bins {
                 all = all.lesser(f32x8::simd_from(simd, *bin));
                 sum += counted;
             }
-            // Then of what is behind.
+            // Add those of what is behind.
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             for bin in (1..rule.count).rev() {
                 let places = (boxes.get(bin), counts.get(bin), costs.get(bin));
@@ -277,7 +282,7 @@ fn partition<S: Simd>(
 ) -> (usize, [f32x8<S>; 2]) {
     let nothing = f32x8::splat(simd, f32::INFINITY);
     let (mut centers, mut middle) = ([nothing; 2], 0);
-    // The first item behind the first part.
+    // Always the item at `middle`, the first one that is not in the first part.
     let mut other = wide(simd, items.first().unwrap_or(&[0; 8]));
     for at in 0..items.len() {
         debug_assert!(middle <= at, "more items in the first part than were looked at");
@@ -286,6 +291,7 @@ fn partition<S: Simd>(
         let item = wide(simd, item);
         let center = center(sides_of(simd, item));
         grow(simd, &mut centers, is_first, center);
+        // Without vectors a choice is eight instructions and a branch is cheap.
         if !HAS_VECTORS {
             if is_first {
                 put(items, at, other);
@@ -295,7 +301,7 @@ fn partition<S: Simd>(
             }
             continue;
         }
-        // No branch: the side of an item is unpredictable.
+        // With vectors, choose in registers: the side of an item is unpredictable.
         let mask = mask32x8::splat(simd, is_first);
         put(items, at, mask.select(other, item));
         put(items, middle, mask.select(item, other));
@@ -335,5 +341,133 @@ const fn bin_count(items: usize) -> usize {
         0..=32 => 8,
         33..=256 => 16,
         _ => MOST_BINS,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::random;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+
+    /// A cut with the vectors of a level: the items before it, and the extents of both parts.
+    struct CutOf<'a>(&'a mut [TriangleItem]);
+
+    impl Kernel for CutOf<'_> {
+        type Output = Option<(usize, [Extent; 2])>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let centers = Extent::of(simd, self.0).centers;
+            Bins::new().cut(simd, self.0, &centers, UNIT)
+        }
+    }
+
+    const UNIT: f32 = 0.125;
+
+    fn sides_of_item(item: &TriangleItem) -> Sides {
+        let [x, y, z, _, u, v, w, _] = item.map(f32::from_bits);
+        [x, y, z, 0.0, u, v, w, 0.0]
+    }
+
+    /// The extent of some items, and the cost of entering them.
+    fn extent_of(items: &[TriangleItem]) -> (Extent, f32) {
+        let mut extent = Extent::NOTHING;
+        for sides in items.iter().map(sides_of_item) {
+            let [x, y, z, _, u, v, w, _] = sides;
+            let centers = [x - u, y - v, z - w, 0.0, u - x, v - y, w - z, 0.0];
+            for lane in 0..8 {
+                extent.bounds[lane] = extent.bounds[lane].min(sides[lane]);
+                extent.centers[lane] = extent.centers[lane].min(centers[lane]);
+            }
+        }
+        let size = |axis: usize| (extent.bounds[axis] + extent.bounds[axis + 4]) * UNIT;
+        let (x, y, z) = (size(0), size(1), size(2));
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let count = items.len() as f32;
+        (extent, (x * y + y * z + z * x) * count)
+    }
+
+    /// The same cut, found by trying each; in case of a tie that of the first axis, then of the last bin.
+    fn naive(items: &mut [TriangleItem]) -> Option<(usize, [Extent; 2])> {
+        let rule = BinScale::new(items.len(), &extent_of(items).0.centers);
+        let mut best = (f32::INFINITY, 0, 0);
+        for axis in (0..3).filter(|&axis| rule.scale[axis] < f32::MAX) {
+            for bin in (1..rule.count).rev() {
+                let is_first = |item: &&TriangleItem| rule.bin_of(item, axis) < bin;
+                let (first, second): (Vec<_>, Vec<_>) = items.iter().partition(is_first);
+                if first.is_empty() || second.is_empty() {
+                    continue;
+                }
+                let cost = extent_of(&first).1 + extent_of(&second).1;
+                if cost < best.0 {
+                    best = (cost, axis, bin);
+                }
+            }
+        }
+        let (cost, axis, bin) = best;
+        if cost.is_infinite() {
+            return None;
+        }
+        let mut middle = 0;
+        for at in 0..items.len() {
+            if rule.bin_of(&items[at], axis) < bin {
+                items.swap(at, middle);
+                middle += 1;
+            }
+        }
+        Some((middle, [extent_of(&items[..middle]).0, extent_of(&items[middle..]).0]))
+    }
+
+    #[test]
+    fn the_cheapest_cut_is_found_alike_with_all_vectors() {
+        let mut state = 1;
+        let mut alike = 0;
+        for count in [2_u32, 5, 8, 9, 32, 33, 100, 256, 257, 400] {
+            // Coordinates of few bits make ties; the last kinds are flat, lines, and all in one place.
+            for (steps, flat) in [(1e6, 3), (8.0, 3), (2.0, 3), (8.0, 2), (8.0, 1), (8.0, 0)] {
+                let mut number = |axis: u8| {
+                    let number = (random::point(&mut state).x * steps).floor() / steps;
+                    if axis < flat { number } else { 0.5 }
+                };
+                let items: Vec<TriangleItem> = (0..count)
+                    .map(|id| {
+                        let low = [number(0), number(1), number(2)];
+                        let size = [number(0), number(1), number(2)].map(f32::abs);
+                        let [x, y, z] = low.map(f32::to_bits);
+                        let [u, v, w] = [0, 1, 2].map(|axis| (-(low[axis] + size[axis])).to_bits());
+                        [x, y, z, id, u, v, w, 0]
+                    })
+                    .collect();
+                let mut expected = items.clone();
+                let found = naive(&mut expected);
+                alike += usize::from(found.is_none());
+                for level in SimdLevel::available() {
+                    let mut items = items.clone();
+                    let cut = dispatch(level, CutOf(&mut items));
+                    let parts = |cut: &Option<(usize, [Extent; 2])>| {
+                        cut.map(|(middle, parts)| (middle, parts.map(|p| (p.bounds, p.centers))))
+                    };
+                    assert_eq!(parts(&cut), parts(&found), "{level:?}, {count}, {steps}, {flat}");
+                    assert_eq!(items, expected, "{level:?}, {count}, {steps}, {flat}");
+                }
+            }
+        }
+        assert!(alike > 0, "no items that bins cannot tell apart");
+    }
+
+    #[test]
+    fn a_split_that_is_less_is_cheaper_or_comes_first() {
+        let in_order = [(0, 31, 1.0), (0, 30, 1.0), (1, 9, 1.0), (0, 1, 1.5), (2, 1, f32::MAX)];
+        let splits = in_order.map(|(axis, bin, cost)| Split::new(axis, bin, cost));
+        assert!(splits.is_sorted_by(|a, b| a < b) && splits[4] < Split::NONE);
+        for (split, (axis, bin, _)) in splits.iter().zip(in_order) {
+            assert_eq!((split.axis(), split.bin()), (axis, bin));
+        }
+        for cost in [f32::INFINITY, f32::NAN, -f32::NAN] {
+            assert!(Split::new(0, 31, cost) > Split::NONE);
+        }
     }
 }
