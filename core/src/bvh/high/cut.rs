@@ -3,7 +3,7 @@
 //! ```text
 //! for each triangle:  bin of its centre on each axis; grow the bins' boxes, count
 //! for each axis:      sweep from both ends; cost of a cut = area * count, summed over both sides
-//! for each triangle:  swap it to the first part, or leave it; grow the box of its part's centres
+//! for each triangle:  move it to the first part or the second; grow the box of its part's centres
 //! ```
 //!
 //! A box is one vector: least x, y, z and minus greatest x, y, z. So the union of two boxes is one minimum,
@@ -67,24 +67,12 @@ pub(super) struct Bins {
     counts: [[u32; MOST_BINS]; 3],
 }
 
-/// An item in a vector.
-#[inline(always)]
-fn wide<S: Simd>(simd: S, item: &TriangleItem) -> u32x8<S> {
-    u32x8::simd_from(simd, *item)
-}
-
 /// The box of an item without its id, which may be a denormal number: these are slow.
 #[inline(always)]
-fn sides_of<S: Simd>(simd: S, item: u32x8<S>) -> f32x8<S> {
+fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
     let word = u32::MAX;
     let mask = u32x8::simd_from(simd, [word, word, word, 0, word, word, word, 0]);
-    (item & mask).bitcast()
-}
-
-/// The box of an item.
-#[inline(always)]
-fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
-    sides_of(simd, wide(simd, item))
+    (u32x8::simd_from(simd, *item) & mask).bitcast()
 }
 
 /// Twice the centre of a box, and minus that.
@@ -273,6 +261,10 @@ impl Bins {
 }
 
 /// Brings the items before a cut to the front; returns how many there are, and the boxes of twice the centres.
+///
+/// Each item moves to the end of the first part, and the item that was there into the gap that the last one left
+/// (Lomuto's partition as one cycle). Where items go depends on their sides, but no branch does, as sides are
+/// unpredictable. A choice between two items would become a masked store, and loads wait for such a store.
 #[inline(always)]
 fn partition<S: Simd>(
     simd: S,
@@ -280,38 +272,34 @@ fn partition<S: Simd>(
     rule: &BinScale,
     cut: &Split,
 ) -> (usize, [f32x8<S>; 2]) {
-    let nothing = f32x8::splat(simd, f32::INFINITY);
-    let (mut centers, mut middle) = ([nothing; 2], 0);
-    // Always the item at `middle`, the first one that is not in the first part.
-    let mut other = wide(simd, items.first().unwrap_or(&[0; 8]));
-    for at in 0..items.len() {
-        debug_assert!(middle <= at, "more items in the first part than were looked at");
-        let Some(item) = items.get(at) else { break };
+    let mut centers = [f32x8::splat(simd, f32::INFINITY); 2];
+    let Some(&start) = items.first() else { return (0, centers) };
+    let (mut middle, mut gap) = (0, 0);
+    for at in 1..=items.len() {
+        debug_assert!(
+            middle <= gap && gap < at,
+            "more items in the first part than were looked at"
+        );
+        // The item at the start comes last: it left the first gap.
+        let item = items.get(at).unwrap_or(&start);
         let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
-        let item = wide(simd, item);
-        let center = center(sides_of(simd, item));
-        grow(simd, &mut centers, is_first, center);
-        // Without vectors a choice is eight instructions and a branch is cheap.
-        if !HAS_VECTORS {
-            if is_first {
-                put(items, at, other);
-                put(items, middle, item);
-                middle += 1;
-                other = wide(simd, items.get(middle).unwrap_or(&[0; 8]));
-            }
-            continue;
-        }
-        // With vectors, choose in registers: the side of an item is unpredictable.
-        let mask = mask32x8::splat(simd, is_first);
-        put(items, at, mask.select(other, item));
-        put(items, middle, mask.select(item, other));
-        // Keep `other` in a register. Loaded again from the place where it was just stored, it would make each item
-        // wait for the one before.
-        let next = wide(simd, items.get(middle + 1).unwrap_or(&[0; 8]));
-        other = mask.select(next, other);
+        grow(simd, &mut centers, is_first, center(load(simd, item)));
+        let item = u32x8::simd_from(simd, *item);
+        let Some(other) = items.get(middle).or_bug("a place behind the items") else { break };
+        put(items, gap, u32x8::simd_from(simd, *other));
+        put(items, middle, item);
+        gap = at;
         middle += usize::from(is_first);
     }
     (middle, centers)
+}
+
+/// Stores an item.
+#[inline(always)]
+fn put<S: Simd>(items: &mut [TriangleItem], at: usize, item: u32x8<S>) {
+    if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
+        *slot = item.into();
+    }
 }
 
 /// Grows the first or the second of two boxes. With vectors both stay in registers.
@@ -327,14 +315,6 @@ fn grow<S: Simd>(simd: S, boxes: &mut [f32x8<S>; 2], is_first: bool, by: f32x8<S
     boxes[1] = boxes[1].lesser(mask.select(nothing, by));
 }
 
-/// Stores an item.
-#[inline(always)]
-fn put<S: Simd>(items: &mut [TriangleItem], at: usize, item: u32x8<S>) {
-    if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
-        *slot = item.into();
-    }
-}
-
 /// Bins of each axis for so many items.
 const fn bin_count(items: usize) -> usize {
     match items {
@@ -346,6 +326,7 @@ const fn bin_count(items: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
     use alloc::vec::Vec;
 
     use super::*;
@@ -390,7 +371,8 @@ mod tests {
         (extent, (x * y + y * z + z * x) * count)
     }
 
-    /// The same cut, found by trying each; in case of a tie that of the first axis, then of the last bin.
+    /// The same cut, found by trying each; in case of a tie that of the first axis, then of the last bin. Both parts are
+    /// in the order of their ids.
     fn naive(items: &mut [TriangleItem]) -> Option<(usize, [Extent; 2])> {
         let rule = BinScale::new(items.len(), &extent_of(items).0.centers);
         let mut best = (f32::INFINITY, 0, 0);
@@ -411,13 +393,9 @@ mod tests {
         if cost.is_infinite() {
             return None;
         }
-        let mut middle = 0;
-        for at in 0..items.len() {
-            if rule.bin_of(&items[at], axis) < bin {
-                items.swap(at, middle);
-                middle += 1;
-            }
-        }
+        let is_first = |item: &TriangleItem| rule.bin_of(item, axis) < bin;
+        let middle = items.iter().filter(|item| is_first(item)).count();
+        items.sort_by_key(|item| (!is_first(item), item[ID]));
         Some((middle, [extent_of(&items[..middle]).0, extent_of(&items[middle..]).0]))
     }
 
@@ -444,14 +422,22 @@ mod tests {
                 let mut expected = items.clone();
                 let found = naive(&mut expected);
                 alike += usize::from(found.is_none());
+                let middle = found.map_or(count as usize, |(middle, _)| middle);
+                let mut order: Option<Vec<TriangleItem>> = None;
                 for level in SimdLevel::available() {
                     let mut items = items.clone();
                     let cut = dispatch(level, CutOf(&mut items));
                     let parts = |cut: &Option<(usize, [Extent; 2])>| {
                         cut.map(|(middle, parts)| (middle, parts.map(|p| (p.bounds, p.centers))))
                     };
-                    assert_eq!(parts(&cut), parts(&found), "{level:?}, {count}, {steps}, {flat}");
-                    assert_eq!(items, expected, "{level:?}, {count}, {steps}, {flat}");
+                    let case = format!("{level:?}, {count}, {steps}, {flat}");
+                    assert_eq!(parts(&cut), parts(&found), "{case}");
+                    // All levels leave the items in the same order.
+                    assert_eq!(order.get_or_insert_with(|| items.clone()), &items, "{case}");
+                    let (first, second) = items.split_at_mut(middle);
+                    first.sort_by_key(|item| item[ID]);
+                    second.sort_by_key(|item| item[ID]);
+                    assert_eq!(items, expected, "{case}");
                 }
             }
         }
