@@ -67,7 +67,7 @@ inline_unless_small! {
     }
 }
 
-/// Turns counts of digits into places, so many of them: each is the sum of all counts before it.
+/// Turns the counts of the first so many digits into places: each is the sum of the counts before it.
 struct Sums<'a>(&'a mut [u16; COUNTS], usize);
 
 impl Kernel for Sums<'_> {
