@@ -305,7 +305,7 @@ pub struct CompareArgs {
     /// The structures of hgrid, between commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     pub methods: Vec<Method>,
-    /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
+    /// For `bvh`: `high` takes a longer build, after which most rays are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
     pub quality: Option<Quality>,
     /// The other structures, between commas [default: all that this program has]

@@ -55,7 +55,7 @@ inline_unless_small! {
             heads[digit(entry)] += 1;
         }
         // Sum up the counts: where each digit starts.
-        dispatch(level, Sums(&mut heads, 1 << width));
+        dispatch(level, Sums { heads: &mut heads, digits: 1 << width });
         // Move the entries.
         for entry in from {
             let head = &mut heads[digit(entry)];
@@ -67,15 +67,19 @@ inline_unless_small! {
     }
 }
 
-/// Turns the counts of the first so many digits into places: each is the sum of the counts before it.
-struct Sums<'a>(&'a mut [u16; COUNTS], usize);
+/// Replaces the counts of the first digits by places: each is the sum of the counts before it.
+struct Sums<'a> {
+    heads: &'a mut [u16; COUNTS],
+    /// Number of digits.
+    digits: usize,
+}
 
 impl Kernel for Sums<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self(heads, digits) = self;
+        let Self { heads, digits } = self;
         if !HAS_VECTORS {
             let mut end = 0;
             for head in heads.iter_mut().take(digits) {

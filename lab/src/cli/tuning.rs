@@ -18,7 +18,7 @@ pub struct Tuning {
     /// For `recursive`: levels of grids, 1 to 4 [default: the paper's, 3]
     #[arg(long, value_name = "LEVELS", allow_negative_numbers = true, value_parser = whole(1..=MAX_DEPTH))]
     pub depth: Option<u32>,
-    /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
+    /// For `bvh`: `high` takes a longer build, after which most rays are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
     pub quality: Option<Quality>,
 }

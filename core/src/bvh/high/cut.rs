@@ -148,10 +148,11 @@ const fn bin(place: f32) -> usize {
     place.to_bits() as usize % MOST_BINS
 }
 
-/// A split of a range: the bins of an axis from one on are the second part.
+/// A split of a range: an axis, and the bin on it at which the second part begins.
 ///
-/// One number, so that the least can be found without a branch: the bits of the cost, then the axis, then 255 minus the
-/// bin. Of equal costs that on the first axis is the least, then that at the last bin.
+/// A split is one number, so that the least can be found without a branch. Its highest bits are those of the cost; then
+/// come the axis and 255 minus the bin. Among splits of equal cost, that on the first axis is the least, then that at
+/// the last bin.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Split(u64);
 
@@ -262,10 +263,10 @@ impl Bins {
 
 /// Brings the items before a cut to the front; returns how many there are, and the boxes of twice the centres.
 ///
-/// Each item moves to the place behind the first part, and the item that was there into the gap that the item before
-/// left; then the first part grows if the item belongs to it (Lomuto's partition as one cycle). No branch depends on
-/// the part to which an item belongs, as that is unpredictable. A choice between two items would become a masked store
-/// where the compiler may use AVX-512, and the next loads would wait for it.
+/// Each item moves to the place behind the first part. The item that was there moves into the gap that the item before
+/// left. Then the first part grows if it has the item (Lomuto's partition as one cycle). No branch depends on the part
+/// to which an item belongs, as that is unpredictable. A choice between two items would become a masked store where the
+/// compiler may use AVX-512, and the next loads would wait for it.
 #[inline(always)]
 fn partition<S: Simd>(
     simd: S,
@@ -275,18 +276,17 @@ fn partition<S: Simd>(
 ) -> (usize, [f32x8<S>; 2]) {
     let mut centers = [f32x8::splat(simd, f32::INFINITY); 2];
     let Some(&start) = items.first() else { return (0, centers) };
-    let (mut middle, mut gap) = (0, 0);
-    for at in 1..=items.len() {
-        debug_assert!(middle <= gap && gap + 1 == at, "the first part reaches behind the gap");
+    let mut middle = 0;
+    for gap in 0..items.len() {
+        debug_assert!(middle <= gap, "the first part reaches behind the gap");
         // The first item comes last: its place was the first gap.
-        let item = items.get(at).unwrap_or(&start);
+        let item = items.get(gap + 1).unwrap_or(&start);
         let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
         grow(simd, &mut centers, is_first, center(load(simd, item)));
         let item = u32x8::simd_from(simd, *item);
         let Some(other) = items.get(middle).or_bug("a place behind the items") else { break };
         put(items, gap, u32x8::simd_from(simd, *other));
         put(items, middle, item);
-        gap = at;
         middle += usize::from(is_first);
     }
     (middle, centers)
