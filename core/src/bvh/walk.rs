@@ -17,6 +17,7 @@ use core::hint::black_box;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
+use glam::Vec3A;
 
 use super::Bvh;
 use super::boxes::{bits, splat};
@@ -26,6 +27,7 @@ use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::{FLIP, NearSides, Slab, flips_of};
 use super::stack::{StackEntry, pop, push};
 use crate::aabb::{Aabb, greater, lesser};
+use crate::before;
 use crate::budget::Budget;
 use crate::counters::Tally;
 use crate::eight::Eight;
@@ -95,11 +97,13 @@ struct Wide<S: Simd> {
     inverse_far: [f32x8<S>; 3],
     start: f32x8<S>,
     filter: RayFilter,
+    /// The start of the ray as a distance, if it may leave a triangle.
+    leaves_at: Option<f32>,
 }
 
 impl<S: Simd> Wide<S> {
     #[inline(always)]
-    fn new(simd: S, slab: &Slab, filter: &RayFilter) -> Self {
+    fn new(simd: S, slab: &Slab, filter: &RayFilter, leaves_at: Option<f32>) -> Self {
         Self {
             origin_near: splat(simd, slab.origin_near.to_array()),
             origin_far: splat(simd, slab.origin_far.to_array()),
@@ -107,6 +111,7 @@ impl<S: Simd> Wide<S> {
             inverse_far: splat(simd, slab.inverse_far().to_array()),
             start: f32x8::splat(simd, slab.start),
             filter: *filter,
+            leaves_at,
         }
     }
 
@@ -121,9 +126,15 @@ impl<S: Simd> Wide<S> {
         ids: &[u32],
     ) -> u32 {
         let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
-        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        let dropped = self.filter.splat(simd).drops(&triangles.corners).to_bitmask() as u32;
-        !dropped & triangles.used
+        let filter = self.filter.splat(simd);
+        let mut passed = !bits(filter.drops(&triangles.corners)) & triangles.used;
+        if passed != 0
+            && let Some(start) = self.leaves_at
+        {
+            let start = f32x8::splat(simd, start);
+            passed &= !bits(filter.passes_before(simd, &triangles.corners, start));
+        }
+        passed
     }
 
     /// Intersects the ray with the boxes of a node. Returns a mask of those that it enters before its end, and the
@@ -316,11 +327,16 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
+        // A ray that starts inside the tree may leave one of its triangles.
+        let origin = Vec3A::from(ray.origin);
+        let may_leave =
+            afar.is_none() && before::may_leave(bounds, &Aabb { min: origin, max: origin });
+        let leaves_at = may_leave.then(|| slab.distance(ray.t_min));
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
         let wide = HAS_VECTORS.then(
             #[inline(always)]
-            || Wide::new(simd, slab, &filter),
+            || Wide::new(simd, slab, &filter, leaves_at),
         );
         let wide = wide.as_ref().map(black_box);
         let flips = flips_of(slab);
@@ -439,8 +455,13 @@ mod tests {
 
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(slab, node, end) = self;
-            let wide =
-                Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, None, flips_of(slab), end);
+            let wide = Wide::new(simd, slab, &RayFilter::NONE, None).meet(
+                simd,
+                node,
+                None,
+                flips_of(slab),
+                end,
+            );
             let one_by_one = meet(simd, slab, node, end);
             [wide, one_by_one].map(|(met, near)| (met, near.into()))
         }
@@ -456,7 +477,7 @@ mod tests {
     #[test]
     fn boxes_are_met_alike_with_vectors_and_without() {
         let mut state = 1;
-        let bounds = Aabb { min: glam::Vec3A::splat(-2.0), max: glam::Vec3A::splat(2.0) };
+        let bounds = Aabb { min: Vec3A::splat(-2.0), max: Vec3A::splat(2.0) };
         let levels: Vec<_> = SimdLevel::available().collect();
         let (mut met_some, mut missed_some) = (0, 0);
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {

@@ -1,0 +1,208 @@
+//! Drops triangles that a ray passes before its start, above all those of the surface that it leaves.
+//!
+//! A ray that starts on a surface passes the [`filter`](crate::filter) with the triangle that it leaves. To answer no,
+//! the f64 test then has to go all the way to the distance. Here f32 says so, wherever it is sure.
+//!
+//! ```text
+//! g, e, f, q and det as in the filter    T = f . q    the line meets the triangle's plane at T / det
+//! N = T - s det                          s: the start of the ray as a multiple of the scaled direction
+//! drop if N is below -bound and det above error, or N above bound and det below -error
+//! ```
+//!
+//! The claim: [`TriangleTest`](crate::triangle::TriangleTest) misses every triangle that is dropped here, if the ray's
+//! origin is its own, not an anchor, and [`may_leave`] returned true. A NaN compares false, so it never drops a triangle.
+//!
+//! # Proof
+//!
+//! Let G be the largest magnitude of a component of g, E that of e and f, and u = 2^-24. Components of d are below 2.
+//!
+//! ```text
+//! error of   sum of its products   roundings of each product                            bound
+//! T          6 G E^2               g 1, e 1, f 1, g * e 1, minus 1, q * f 1, sums 2     48 u G E^2
+//! det        12 E^2                seven, as in the filter                              84 u E^2
+//! N          those of T and of s det, a product 1, a difference 1                       54 u G E^2 + 108 u |s| E^2
+//! ```
+//!
+//! The f64 test moves the corners across the ray, by at most m = 7 * 2^-53 R on each axis; R is the filter's, no less
+//! than G and half of E. If none of them lies before the start, the moved triangle contains the ray behind it: its
+//! N / det is not negative. Else the test decides exactly, on the triangle as it is. The move changes T by at most
+//! 24 m E (G + E) and det by at most 32 m E; what is left is of the second order in m.
+//!
+//! ```text
+//! error    E (56 u E + 2^-24 slope) + floor       slope is at least 29 u R, so the second term covers both changes;
+//!                                                 the floor covers the second order
+//! bound    error (G + E + 2 |s|) + 2^-120         2^-120 covers what underflows
+//! |det| must exceed 1.6 error, which covers 84 u E^2
+//! ```
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+
+use crate::aabb::Aabb;
+use crate::extremes::Extremes;
+use crate::filter::{LineFilter, cross, dot, greatest, minus};
+
+/// The largest extent of a box around all triangles with which T does not overflow: G is less than 2^41 then, because
+/// no origin lies farther than [`FAR_EXTENTS`](crate::approach::FAR_EXTENTS) away, and E is at most 2^38.
+const MOST_EXTENT: f32 = 262_144.0 * 1_048_576.0; // 2^38
+
+/// 56 * 2^-24.
+const UNITS: f32 = 56.0 / 16_777_216.0;
+/// The part of the filter's slope that covers what moves the corners: 2^-24.
+const OF_SLOPE: f32 = 1.0 / 16_777_216.0;
+/// More than what underflows: 2^-120.
+const LEAST: f32 = f32::from_bits(0x0380_0000);
+
+/// Returns true if rays whose origins lie in a box may leave a triangle in `bounds`. Rays that start outside would
+/// never be dropped.
+#[inline(always)]
+pub(crate) fn may_leave(bounds: &Aabb, origins: &Aabb) -> bool {
+    bounds.meets(origins) && bounds.size().max_element() <= MOST_EXTENT
+}
+
+impl<S: Simd> LineFilter<f32x8<S>> {
+    /// The lanes whose triangles lie, where the line meets them, before `start`: a distance along the scaled direction.
+    ///
+    /// It has most of its terms in common with [`drops`](Self::drops): behind that, the compiler computes only the
+    /// others.
+    #[inline(always)]
+    pub(crate) fn passes_before(
+        &self,
+        simd: S,
+        [a, b, c]: &[[f32x8<S>; 3]; 3],
+        start: f32x8<S>,
+    ) -> mask32x8<S> {
+        let g = minus(self.origin, *a);
+        let e = minus(*b, *a);
+        let f = minus(*c, *a);
+        let det = dot(e, cross(self.direction, f));
+        let ahead = (-start).mul_add(det, dot(f, cross(g, e)));
+
+        let longest = greatest(e).greater(greatest(f));
+        let of_slope = longest.mul_add(f32x8::splat(simd, UNITS), self.slope * OF_SLOPE);
+        let error = longest.mul_add(of_slope, self.floor);
+        let reach = greatest(g) + longest + start.abs() * 2.0;
+        let bound = error.mul_add(reach, f32x8::splat(simd, LEAST));
+        // Dividing by det would give the same sign.
+        let sign = det.bitcast::<u32x8<S>>() & 0x8000_0000;
+        let ahead = (ahead.bitcast::<u32x8<S>>() ^ sign).bitcast::<f32x8<S>>();
+        ahead.simd_lt(-bound) & det.abs().simd_gt(error * 1.6)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::{RayFilter, Reach, splat};
+    use crate::mesh::Triangle;
+    use crate::ray::Ray;
+    use crate::samples::{Random, along, largest, line, triangle};
+    use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
+    use crate::triangle::TriangleTest;
+
+    /// A ray against a triangle in all lanes: true if it is dropped.
+    struct Before<'a>(&'a RayFilter, &'a Triangle, f32);
+
+    impl Kernel for Before<'_> {
+        type Output = bool;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> bool {
+            let Self(filter, triangle, start) = self;
+            let start = f32x8::splat(simd, start);
+            let corners = splat(simd, triangle);
+            let dropped = filter.splat(simd).passes_before(simd, &corners, start).to_bitmask();
+            assert!(dropped == 0 || dropped == 0xff, "{dropped:x}");
+            dropped != 0
+        }
+    }
+
+    /// The power of two that a direction is divided by for the filter.
+    fn scale_of(direction: [f32; 3]) -> f32 {
+        f32::from_bits(largest(&[direction]).to_bits() & 0x7f80_0000)
+    }
+
+    #[test]
+    fn what_passes_before_the_start_is_missed_at_every_scale() {
+        if !HAS_VECTORS {
+            return;
+        }
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        let rounds = if cfg!(miri) { 30 } else { 600_000 };
+        for scale in [1.0, 1e-30, 1e-9, 1e-3, 1e3, 1e11] {
+            let (mut hits, mut before, mut drops) = (0, 0, 0);
+            for _ in 0..rounds / 6 {
+                let triangle = triangle(&mut random);
+                let (origin, direction) = line(&mut random, &triangle);
+                let shift = [0.0, 0.0, 100.0][random.below(3)];
+                let place = |point: [f32; 3]| point.map(|x| (x + shift) * scale);
+                let (triangle, origin) = (triangle.map(place), place(origin));
+                let direction = direction.map(|d| d * [1.0, 1e-10, 1e10][random.below(3)]);
+                if scale_of(direction) <= 0.0 {
+                    continue;
+                }
+                // Start at the triangle, just before or behind it, at the origin, or anywhere.
+                let whole = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(origin, direction) };
+                let Some(met) = TriangleTest::new(&whole).and_then(|test| test.test(&triangle))
+                else {
+                    continue;
+                };
+                let t_min = match random.below(8) {
+                    0 => met.t,
+                    1 => met.t.next_up(),
+                    2 => met.t.next_down(),
+                    3 => met.t + met.t.abs() * 1e-6,
+                    4 => met.t + met.t.abs() * 1e-3,
+                    5 => 0.0,
+                    6 => f32::NEG_INFINITY,
+                    _ => met.t + met.t.abs(),
+                };
+                let ray = Ray { t_min, ..whole };
+                let is_hit = TriangleTest::new(&ray).unwrap().test(&triangle).is_some();
+                let [a, b, c] = triangle.map(glam::Vec3A::from_array);
+                let bounds = Aabb { min: a.min(b).min(c), max: a.max(b).max(c) };
+                let filter = RayFilter::new(direction, origin, 0.0, Reach::of(&bounds, origin));
+                let start = t_min * scale_of(direction);
+                for level in SimdLevel::available() {
+                    let is_dropped = dispatch(level, Before(&filter, &triangle, start));
+                    assert!(!(is_hit && is_dropped), "{level:?} {ray:?} {triangle:?}");
+                    drops += u32::from(is_dropped && level == SimdLevel::detect());
+                }
+                hits += u32::from(is_hit);
+                before += u32::from(!is_hit);
+            }
+            if cfg!(miri) {
+                continue;
+            }
+            assert!(hits > 2000 && before > 2000, "{scale}: {hits} {before}");
+            let is_in_range = (1e-9..=1e11).contains(&scale);
+            assert!(!is_in_range || drops > before / 4, "{scale}: {drops} of {before}");
+        }
+    }
+
+    /// A ray that starts a ten-thousandth of a small triangle's length above it does not test it.
+    #[test]
+    fn the_surface_that_a_ray_leaves_is_dropped() {
+        if !HAS_VECTORS {
+            return;
+        }
+        let mut random = Random(0x2545_f491_4f6c_dd1d);
+        let bounds = Aabb { min: glam::Vec3A::splat(-1.0), max: glam::Vec3A::splat(1.0) };
+        let mut drops = 0;
+        for _ in 0..1000 {
+            let a = random.point();
+            let triangle = [a, along(a, [1.0, 0.0, 0.0], 1e-3), along(a, [0.0, 1.0, 0.0], 1e-3)];
+            let direction = [random.coordinate(), random.coordinate(), 1.0];
+            let origin = along(along(a, [0.3, 0.3, 0.0], 1e-3), [0.0, 0.0, 1.0], 1e-7);
+            let filter = RayFilter::new(direction, origin, 0.0, Reach::of(&bounds, origin));
+            drops += u32::from(dispatch(SimdLevel::detect(), Before(&filter, &triangle, 0.0)));
+            // The same from the other side, and with a start behind the triangle.
+            let [x, y, z] = along(along(a, [0.3, 0.3, 0.0], 1e-3), [0.0, 0.0, 1.0], -1e-3);
+            let filter =
+                RayFilter::new([0.0, 0.0, 1.0], [x, y, z], 0.0, Reach::of(&bounds, [x, y, z]));
+            assert!(!dispatch(SimdLevel::detect(), Before(&filter, &triangle, 0.9e-3)));
+            assert!(dispatch(SimdLevel::detect(), Before(&filter, &triangle, 1.1e-3)));
+        }
+        assert!(drops > 900, "{drops}");
+    }
+}
