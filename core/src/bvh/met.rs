@@ -149,9 +149,6 @@ fn side_by_side<S: Simd>(
         let (mut by, mut least) = (0, far_away);
         for which in 0..GROUP / 16 {
             let of_sixteen = mask >> (16 * which) & 0xffff;
-            if of_sixteen == 0 {
-                continue;
-            }
             let (near, is_met) = child.meet(simd, &rays.sixteen(simd, which));
             // Mask afterwards: an invalid ray has NaN distances and would count as a hit.
             let is_met = is_met & mask32x16::from_bitmask(simd, of_sixteen);

@@ -344,10 +344,8 @@ impl Rays {
         let distance = f32x16::splat(simd, distance);
         let mut behind = 0;
         for which in 0..GROUP / 16 {
-            if rays >> (16 * which) & 0xffff != 0 {
-                let is_behind = sixteen(simd, &self.end, which).simd_ge(distance);
-                behind |= is_behind.to_bitmask() << (16 * which);
-            }
+            let is_behind = sixteen(simd, &self.end, which).simd_ge(distance);
+            behind |= is_behind.to_bitmask() << (16 * which);
         }
         behind & rays
     }
