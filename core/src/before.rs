@@ -9,8 +9,9 @@
 //! drop if N is below -bound and det above error, or N above bound and det below -error
 //! ```
 //!
-//! The claim: [`TriangleTest`](crate::triangle::TriangleTest) misses every triangle that is dropped here, if the ray's
-//! origin is its own, not an anchor, and [`may_leave`] returned true. A NaN compares false, so it never drops a triangle.
+//! The claim: [`TriangleTest`](crate::triangle::TriangleTest) misses every triangle that is dropped here, if the filter
+//! starts at the ray's own origin, without slack, and [`pays`] returned true for the box around all triangles. A NaN
+//! compares false, and an infinite s makes the bound infinite: neither drops a triangle.
 //!
 //! # Proof
 //!
@@ -23,16 +24,17 @@
 //! N          those of T and of s det, a product 1, a difference 1                       54 u G E^2 + 108 u |s| E^2
 //! ```
 //!
-//! The f64 test moves the corners across the ray, by at most m = 7 * 2^-53 R on each axis; R is the filter's, no less
-//! than G and half of E. If none of them lies before the start, the moved triangle contains the ray behind it: its
-//! N / det is not negative. Else the test decides exactly, on the triangle as it is. The move changes T by at most
-//! 24 m E (G + E) and det by at most 32 m E; what is left is of the second order in m.
+//! The f64 test moves the corners by at most m = 7 * 2^-53 R on each of the two axes across the ray; R is the filter's,
+//! no less than G and half of E. Depths stay what they are. If no corner lies before the start, the moved triangle
+//! contains a point of the ray that does not: its N / det is not negative. Else the test decides exactly, on the
+//! triangle as it is. The move changes T by at most 24 m E (G + E) and det by at most 32 m E; the second order in m is
+//! below 28 m^2 (G + E) and 16 m^2.
 //!
 //! ```text
-//! error    E (56 u E + 2^-24 slope) + floor       slope is at least 29 u R, so the second term covers both changes;
-//!                                                 the floor covers the second order
-//! bound    error (G + E + 2 |s|) + 2^-120         2^-120 covers what underflows
-//! |det| must exceed 1.6 error, which covers 84 u E^2
+//! error    E (56 u E + 2^-24 slope) + floor       slope is at least 29 u R, so the second term covers the changes;
+//!                                                 floor is at least 28 m^2 + 2^-120
+//! bound    error (G + E + 2 |s|) + 2^-120         floor and 2^-120 cover what underflows
+//! |det| must exceed 1.6 error: more than 84 u E^2 and its change, so that no move turns the triangle round
 //! ```
 
 use fearless_simd::prelude::*;
@@ -53,18 +55,17 @@ const OF_SLOPE: f32 = 1.0 / 16_777_216.0;
 /// More than what underflows: 2^-120.
 const LEAST: f32 = f32::from_bits(0x0380_0000);
 
-/// Returns true if rays whose origins lie in a box may leave a triangle in `bounds`. Rays that start outside would
-/// never be dropped.
+/// Returns true if the test is worth its time for rays whose origins lie in a box: it meets the box around all
+/// triangles, which is not too large. Rays from outside have no triangle behind them.
 #[inline(always)]
-pub(crate) fn may_leave(bounds: &Aabb, origins: &Aabb) -> bool {
+pub(crate) fn pays(bounds: &Aabb, origins: &Aabb) -> bool {
     bounds.meets(origins) && bounds.size().max_element() <= MOST_EXTENT
 }
 
 impl<S: Simd> LineFilter<f32x8<S>> {
     /// The lanes whose triangles lie, where the line meets them, before `start`: a distance along the scaled direction.
     ///
-    /// It has most of its terms in common with [`drops`](Self::drops): behind that, the compiler computes only the
-    /// others.
+    /// It has most of its terms in common with [`drops`](Self::drops), and after it costs only the others.
     #[inline(always)]
     pub(crate) fn passes_before(
         &self,
@@ -147,7 +148,11 @@ mod tests {
                 else {
                     continue;
                 };
-                let t_min = match random.below(8) {
+                let t_min = match random.below(12) {
+                    8 => f32::MAX,
+                    9 => f32::MIN,
+                    10 => f32::from_bits(1),
+                    11 => -f32::from_bits(1),
                     0 => met.t,
                     1 => met.t.next_up(),
                     2 => met.t.next_down(),
@@ -178,6 +183,19 @@ mod tests {
             let is_in_range = (1e-9..=1e11).contains(&scale);
             assert!(!is_in_range || drops > before / 4, "{scale}: {drops} of {before}");
         }
+    }
+
+    #[test]
+    fn the_test_pays_for_origins_inside_boxes_that_are_not_too_large() {
+        let cube = |from: f32, to: f32| Aabb {
+            min: glam::Vec3A::splat(from),
+            max: glam::Vec3A::splat(to),
+        };
+        assert!(pays(&cube(-1.0, 1.0), &cube(1.0, 1.0)));
+        assert!(pays(&cube(-1.0, 1.0), &cube(-3.0, 3.0)));
+        assert!(!pays(&cube(-1.0, 1.0), &cube(1.5, 3.0)));
+        assert!(pays(&cube(0.0, MOST_EXTENT), &cube(1.0, 1.0)));
+        assert!(!pays(&cube(0.0, 2.0 * MOST_EXTENT), &cube(1.0, 1.0)));
     }
 
     /// A ray that starts a ten-thousandth of a small triangle's length above it does not test it.

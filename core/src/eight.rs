@@ -340,30 +340,34 @@ mod tests {
 
                 // One to eight, some of which do not exist, sometimes more than eight.
                 let ids: Vec<u32> = (0..round % 11).map(|_| random.next() % 220).collect();
-                let mut expected = expected(&test, &mesh, &ids[..ids.len().min(LANES)]);
-                // The filter may drop a triangle that leaves the box, on some machines.
-                let is_inside = |&(lane, _): &(usize, [u32; 3])| {
-                    let triangle = mesh.triangle(ids[lane]).unwrap_or_default();
+                let expected = expected(&test, &mesh, &ids[..ids.len().min(LANES)]);
+                // The filter promises nothing about triangles outside of the box.
+                let is_inside = |(lane, _): &&(usize, [u32; 3])| {
+                    let triangle = mesh.triangle(ids[*lane]).unwrap_or_default();
                     !triangle.as_flattened().iter().any(|x| x.is_finite() && x.abs() > scale)
                 };
-                expected.1.retain(is_inside);
                 let kernel = Test { ray: &test, mesh: &mesh, ids: &ids };
                 // Machines without vectors filter triangle by triangle, as `expected` does.
                 for level in SimdLevel::available() {
                     if !HAS_VECTORS {
                         break;
                     }
-                    let mut answer = dispatch(level, kernel);
-                    answer.1.retain(is_inside);
-                    assert_eq!(answer.1, expected.1, "{level:?} {scale} {ray:?} {ids:?}");
-                    others += (answer.0 ^ expected.0).count_ones();
+                    let answer = dispatch(level, kernel);
+                    if level.fuses() {
+                        let [found, hits] =
+                            [&answer, &expected].map(|(_, hits)| hits.iter().filter(is_inside));
+                        assert!(found.eq(hits), "{level:?} {scale} {ray:?} {ids:?}");
+                        others += (answer.0 ^ expected.0).count_ones();
+                    } else {
+                        assert_eq!(answer, expected, "{level:?} {scale} {ray:?} {ids:?}");
+                    }
                 }
                 survivors += expected.0.count_ones();
                 hits += expected.1.len();
             }
         }
         assert!(survivors as usize > 2 * rounds && 4 * hits > rounds, "{survivors} {hits}");
-        // Where products are fused, hardly any triangle passes that does not elsewhere, or the other way round.
+        // Fused products let few other triangles pass.
         assert!(50 * others < survivors, "{others} of {survivors}");
     }
 

@@ -39,6 +39,33 @@ fn rays_that_are_no_rays_miss() {
     assert_eq!(ask(&mesh, [Ray { t_min: f32::NEG_INFINITY, ..sound }]), 1);
 }
 
+/// Rays from inside a mesh and from its surfaces, with a start before the origin, at it and behind it, and directions of
+/// every length: what lies before the start is no hit, all else is.
+#[test]
+fn starts_lie_on_either_side_of_surfaces() {
+    let mesh = ball(8, 0.0);
+    let view = mesh.view();
+    let mut random = Random(77);
+    let mut rays = Vec::new();
+    for round in 0..rounds(120) {
+        let direction = random.point();
+        let whole = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(random.point(), direction) };
+        // The origin lies inside the ball or on one of its triangles, where the whole line meets it.
+        let found = oracle::hits_of(&view, &whole, Cull::None);
+        let at = found.get(round % 3).map_or(0.0, |hit| hit.t);
+        let origin = core::array::from_fn(|k| whole.origin[k] + at * direction[k]);
+        let power = [0, 0, -125, 124, -140, 30][random.below(6)];
+        let direction = direction.map(|d| d * 2.0_f32.powi(power));
+        for start in [-3.0, -0.5, -1e-3, 0.0, 1e-6, 1e-3, 0.5] {
+            let t_min = start * 2.0_f32.powi(-power);
+            rays.push(Ray { t_min, ..Ray::new(origin, direction) });
+        }
+    }
+    let count = rays.len();
+    let hits = ask(&mesh, rays);
+    assert!(hits > count / 2 && hits < count, "{hits} of {count}");
+}
+
 /// Directions with zero, negative zero, denormal and tiny components, alone and together.
 #[test]
 fn directions_along_axes_and_nearly_so() {

@@ -46,7 +46,7 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
-    /// True if some rays start inside the box, so that they may leave one of its triangles.
+    /// True if some origins lie inside the box, so that their rays may leave one of its triangles.
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
@@ -213,7 +213,7 @@ impl Rays {
         let [x, y, z] = self.origins;
         let center = Vec3A::from(self.center);
         let (low, high) = (Vec3A::new(x[0], y[0], z[0]), Vec3A::new(x[1], y[1], z[1]));
-        self.may_leave = before::may_leave(bounds, &Aabb { min: center + low, max: center + high });
+        self.may_leave = before::pays(bounds, &Aabb { min: center + low, max: center + high });
         special
     }
 

@@ -327,10 +327,9 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
-        // A ray that starts inside the tree may leave one of its triangles.
+        // A ray whose origin lies inside the tree may leave one of its triangles.
         let origin = Vec3A::from(ray.origin);
-        let may_leave =
-            afar.is_none() && before::may_leave(bounds, &Aabb { min: origin, max: origin });
+        let may_leave = afar.is_none() && before::pays(bounds, &Aabb { min: origin, max: origin });
         let leaves_at = may_leave.then(|| slab.distance(ray.t_min));
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
