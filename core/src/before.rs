@@ -25,8 +25,8 @@
 //! ```
 //!
 //! The f64 test moves the corners by at most m = 7 * 2^-53 R on each of the two axes across the ray; R is the filter's,
-//! no less than G and half of E. Depths stay what they are. If no corner lies before the start, the moved triangle
-//! contains a point of the ray that does not: its N / det is not negative. Else the test decides exactly, on the
+//! no less than G and half of E. Depths stay what they are. If no corner lies before the start, neither does the point
+//! where the ray meets the moved triangle: N / det of that is not negative. Else the test decides exactly, on the
 //! triangle as it is. The move changes T by at most 24 m E (G + E) and det by at most 32 m E; the second order in m is
 //! below 28 m^2 (G + E) and 16 m^2.
 //!
