@@ -1,7 +1,7 @@
-//! Drops triangles that a ray passes before its start, above all those of the surface that it leaves.
+//! Drops triangles that the line of a ray meets before the ray starts, such as the one that the ray leaves.
 //!
-//! A ray that starts on a surface passes the [`filter`](crate::filter) with the triangle that it leaves. To answer no,
-//! the f64 test then has to go all the way to the distance. Here f32 says so, wherever it is sure.
+//! The [`filter`](crate::filter) keeps the triangle that a ray leaves, because the line of the ray meets it. The f64
+//! test would compute nearly a whole hit before it rejects that triangle. This test rejects it in f32, if it is sure.
 //!
 //! ```text
 //! g, e, f, q and det as in the filter    T = f . q    the line meets the triangle's plane at T / det
@@ -55,17 +55,17 @@ const OF_SLOPE: f32 = 1.0 / 16_777_216.0;
 /// More than what underflows: 2^-120.
 const LEAST: f32 = f32::from_bits(0x0380_0000);
 
-/// Returns true if the test is worth its time for rays whose origins lie in a box: it meets the box around all
-/// triangles, which is not too large. Rays from outside have no triangle behind them.
+/// Returns true if the test is worth its time: the box around the origins of the rays meets the box around all
+/// triangles, and T cannot overflow. Rays from outside leave no triangle.
 #[inline(always)]
 pub(crate) fn pays(bounds: &Aabb, origins: &Aabb) -> bool {
     bounds.meets(origins) && bounds.size().max_element() <= MOST_EXTENT
 }
 
 impl<S: Simd> LineFilter<f32x8<S>> {
-    /// The lanes whose triangles lie, where the line meets them, before `start`: a distance along the scaled direction.
+    /// The lanes whose line meets its triangle before `start`, a distance along the scaled direction.
     ///
-    /// It has most of its terms in common with [`drops`](Self::drops), and after it costs only the others.
+    /// It shares most terms with [`drops`](Self::drops). After that, the compiler computes only the others.
     #[inline(always)]
     pub(crate) fn passes_before(
         &self,
@@ -84,7 +84,7 @@ impl<S: Simd> LineFilter<f32x8<S>> {
         let error = longest.mul_add(of_slope, self.floor);
         let reach = greatest(g) + longest + start.abs() * 2.0;
         let bound = error.mul_add(reach, f32x8::splat(simd, LEAST));
-        // Dividing by det would give the same sign.
+        // Change the sign where det is negative, as a division by det would.
         let sign = det.bitcast::<u32x8<S>>() & 0x8000_0000;
         let ahead = (ahead.bitcast::<u32x8<S>>() ^ sign).bitcast::<f32x8<S>>();
         ahead.simd_lt(-bound) & det.abs().simd_gt(error * 1.6)

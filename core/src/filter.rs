@@ -2,8 +2,8 @@
 //! a division, with a proven error bound.
 //!
 //! The same function tests one ray against eight triangles, eight rays against one triangle, and one ray against one
-//! triangle. Machines that fuse products with sums round less often, and may drop a few more or less: no hit depends on
-//! that.
+//! triangle. Machines that fuse products with sums round less often, and may drop a few triangles more or less. No hit
+//! depends on that.
 //!
 //! ```text
 //! g = o - a    e = b - a    f = c - a    p = d x f    q = g x e

@@ -3,7 +3,7 @@
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once for each level that
 //! the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the one that was asked for, or the
 //! nearest below. Every level gives the same hits, bit for bit: the kernels use nothing that rounds differently, and
-//! fused multiply-adds only where the product is exact or no hit depends on the last bits (slab tests of groups, and the
+//! fused multiply-adds only where the product is exact or no hit depends on the last bits (slab tests of groups and the
 //! filters).
 //!
 //! ```text
@@ -76,7 +76,7 @@ impl SimdLevel {
         machine::BASE <= self && self <= Self::detect()
     }
 
-    /// Returns true if it has products fused with sums, and kernels use them.
+    /// Returns true if kernels fuse products with sums at this level.
     #[cfg(test)]
     pub(crate) const fn fuses(self) -> bool {
         matches!(self, Self::Neon | Self::Avx2 | Self::Avx512)

@@ -144,8 +144,7 @@ fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x
     across(simd, edge, &corners, far).greater(across(simd, normal, &corners, far))
 }
 
-// Not the products of the filter, which some machines fuse: how many triangles are tested must not depend on the
-// machine.
+// The products of the filter would not do: some machines fuse them, and counters must be the same on all machines.
 
 #[inline(always)]
 fn cross<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {

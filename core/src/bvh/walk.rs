@@ -327,7 +327,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
-        // A ray whose origin lies inside the tree may leave one of its triangles.
+        // A ray from inside the box of the tree may leave a triangle.
         let origin = Vec3A::from(ray.origin);
         let may_leave = afar.is_none() && before::pays(bounds, &Aabb { min: origin, max: origin });
         let leaves_at = may_leave.then(|| slab.distance(ray.t_min));
