@@ -1,16 +1,18 @@
 //! Cuts a range of triangles in two where the SAH cost is least (Wald 2007).
 //!
 //! ```text
+//! for each triangle:  grow the box of the centres, which the bins divide
 //! for each triangle:  bin of its centre on each axis; grow the bins' boxes, count
 //! for each axis:      sweep from both ends; cost of a cut = area * count, summed over both sides
-//! for each triangle:  move it to the first part or the second; grow the box of its part's centres
+//! for each triangle:  move it to the first part or the second
 //! ```
 //!
 //! A box is one vector: least x, y, z and minus greatest x, y, z. So the union of two boxes is one minimum,
 //! and the vector minus itself with its halves swapped is twice the centre.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
+use fearless_simd::{Simd, f32x4, f32x8, u32x8};
+use zerocopy::FromZeros;
 
 use crate::bvh::node::Sides;
 use crate::cell::WHOLE_SHIFT;
@@ -27,45 +29,28 @@ pub(super) const ID: usize = 3;
 /// The box of nothing.
 pub(super) const NOTHING: Sides = [f32::INFINITY; 8];
 
-/// The boxes of some triangles, and of twice their centres.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
-    pub(super) bounds: Sides,
-    pub(super) centers: Sides,
-}
-
-impl Extent {
-    pub(super) const NOTHING: Self = Self { bounds: NOTHING, centers: NOTHING };
-
-    inline_unless_small! {
-        /// The extent of some triangles.
-        pub(super) fn of<S: Simd>(simd: S, items: &[TriangleItem]) -> Self {
-            let mut bounds = f32x8::splat(simd, f32::INFINITY);
-            let mut centers = bounds;
-            for item in items {
-                let sides = load(simd, item);
-                bounds = bounds.lesser(sides);
-                centers = centers.lesser(center(sides));
-            }
-            Self { bounds: bounds.into(), centers: centers.into() }
-        }
-    }
-}
-
 /// Bins of an axis, at most.
 const MOST_BINS: usize = 32;
 
 const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
 
-/// The bins of a range on each axis.
-#[repr(C, align(32))]
-pub(super) struct Bins {
-    /// With the alignment, this keeps the boxes off multiples of 16 bytes, where items lie. Some processors (Zen 4) let
-    /// the load of an item wait for a store to a box if their addresses differ by a multiple of 4096.
-    _off: [u32; 2],
-    boxes: [[Sides; MOST_BINS]; 3],
-    counts: [[u32; MOST_BINS]; 3],
+/// The triangles of a bin: their number, and the box around their boxes.
+///
+/// Bins share no cache line, and the box of one lies in the middle of its line. So it is off the multiples of 32 bytes,
+/// where items lie: some processors let the load of an item wait for a store to a box if their addresses differ by a
+/// multiple of 4096.
+#[repr(C, align(64))]
+#[derive(Debug, Clone, Copy, FromZeros)]
+struct Bin {
+    count: u32,
+    _before: [u32; 3],
+    bounds: Sides,
+    _behind: [u32; 4],
 }
+
+/// The bins of a range on each axis.
+#[derive(FromZeros)]
+pub(super) struct Bins([[Bin; MOST_BINS]; 3]);
 
 /// The box of an item, without its id: that may be a denormal number, and those are slow.
 #[inline(always)]
@@ -80,6 +65,34 @@ fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
 fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     let (low, high) = sides.split();
     sides - high.combine(low)
+}
+
+inline_unless_small! {
+    /// The box of some triangles.
+    pub(super) fn box_of<S: Simd>(simd: S, items: &[TriangleItem]) -> Sides {
+        let mut bounds = f32x8::splat(simd, f32::INFINITY);
+        for item in items {
+            bounds = bounds.lesser(load(simd, item));
+        }
+        bounds.into()
+    }
+}
+
+/// The box of twice the centres of some triangles.
+#[inline(always)]
+fn box_of_centers<S: Simd>(simd: S, items: &[TriangleItem]) -> Sides {
+    let mut centers = f32x8::splat(simd, f32::INFINITY);
+    // Four at a time: each minimum waits for the one before.
+    let (fours, rest) = if HAS_VECTORS { items.as_chunks::<4>() } else { (&[][..], items) };
+    for [a, b, c, d] in fours {
+        let [a, b] = [center(load(simd, a)), center(load(simd, b))];
+        let [c, d] = [center(load(simd, c)), center(load(simd, d))];
+        centers = centers.lesser(a.lesser(b).lesser(c.lesser(d)));
+    }
+    for item in rest {
+        centers = centers.lesser(center(load(simd, item)));
+    }
+    centers.into()
 }
 
 /// Half the surface of a box whose lengths are multiplied by `scale`.
@@ -178,51 +191,45 @@ impl Split {
 }
 
 impl Bins {
-    pub(super) const fn new() -> Self {
-        Self { _off: [0; 2], boxes: [[NOTHING; MOST_BINS]; 3], counts: [[0; MOST_BINS]; 3] }
+    /// Returns all zeros, which the compiler writes in place; [`fill`](Self::fill) clears the bins that it uses.
+    pub(super) fn new() -> Self {
+        Self::new_zeroed()
     }
 
-    /// Cuts some items in two and returns how many are in the first part, and the extents of both; `None` if no bins
+    /// Cuts some items in two and returns how many are in the first part, and the boxes of both; `None` if no bins
     /// tell them apart. Lengths are multiplied by `scale` before areas are computed.
     #[inline(always)]
     pub(super) fn cut<S: Simd>(
         &mut self,
         simd: S,
         items: &mut [TriangleItem],
-        centers: &Sides,
         scale: f32,
-    ) -> Option<(usize, [Extent; 2])> {
-        let rule = BinScale::new(items.len(), centers);
+    ) -> Option<(usize, [Sides; 2])> {
+        let rule = BinScale::new(items.len(), &box_of_centers(simd, items));
         self.fill(simd, items, &rule);
         let place = self.best(simd, &rule, scale)?;
-        let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
-        for (at, bin) in self.boxes[place.axis()].iter().enumerate().take(rule.count) {
-            grow(simd, &mut bounds, at < place.bin(), f32x8::simd_from(simd, *bin));
-        }
-        let (middle, [first, second]) = partition(simd, items, &rule, &place);
-        let [a, b] = bounds;
-        let extents = [
-            Extent { bounds: a.into(), centers: first.into() },
-            Extent { bounds: b.into(), centers: second.into() },
-        ];
-        (middle > 0 && middle < items.len()).then_some((middle, extents))
+        let bins = self.0[place.axis()].get(..rule.count).unwrap_or_default();
+        let (first, second) = bins.split_at_checked(place.bin()).unwrap_or_default();
+        let boxes = [union(simd, first), union(simd, second)];
+        let middle = partition(simd, items, &rule, &place);
+        (middle > 0 && middle < items.len()).then_some((middle, boxes))
     }
 
     /// Grows the boxes of the bins, and counts.
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, items: &[TriangleItem], rule: &BinScale) {
-        for (boxes, counts) in self.boxes.iter_mut().zip(&mut self.counts) {
-            for (bin, counted) in boxes.iter_mut().zip(counts).take(rule.count) {
-                (*bin, *counted) = (NOTHING, 0);
+        for bins in &mut self.0 {
+            for bin in bins.iter_mut().take(rule.count) {
+                (bin.bounds, bin.count) = (NOTHING, 0);
             }
         }
         for item in items {
             let sides = load(simd, item);
             let [x, y, z] = rule.bins_of(simd, sides);
             for (axis, at) in [(0, x), (1, y), (2, z)] {
-                let bin = &mut self.boxes[axis][at % MOST_BINS];
-                *bin = f32x8::simd_from(simd, *bin).lesser(sides).into();
-                self.counts[axis][at % MOST_BINS] += 1;
+                let bin = &mut self.0[axis][at % MOST_BINS];
+                bin.bounds = f32x8::simd_from(simd, bin.bounds).lesser(sides).into();
+                bin.count += 1;
             }
         }
     }
@@ -232,7 +239,7 @@ impl Bins {
     fn best<S: Simd>(&self, simd: S, rule: &BinScale, scale: f32) -> Option<Split> {
         debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
         let mut best = Split::NONE;
-        for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
+        for (axis, bins) in self.0.iter().enumerate() {
             if rule.scale[axis % 3] >= f32::MAX {
                 continue;
             }
@@ -240,19 +247,17 @@ impl Bins {
             // split with it is less than `NONE`.
             let mut costs = [f32::NAN; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
-            let bins = boxes.iter().zip(counts).take(rule.count);
-            for ((bin, counted), cost) in bins.zip(&mut costs) {
+            for (bin, cost) in bins.iter().take(rule.count).zip(&mut costs) {
                 *cost = area(simd, all, scale) * as_cost(sum);
-                all = all.lesser(f32x8::simd_from(simd, *bin));
-                sum += counted;
+                all = all.lesser(f32x8::simd_from(simd, bin.bounds));
+                sum += bin.count;
             }
             // Add those of what is behind.
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             for bin in (1..rule.count).rev() {
-                let places = (boxes.get(bin), counts.get(bin), costs.get(bin));
-                let (Some(bounds), Some(counted), Some(before)) = places else { continue };
-                all = all.lesser(f32x8::simd_from(simd, *bounds));
-                sum += counted;
+                let (Some(of), Some(before)) = (bins.get(bin), costs.get(bin)) else { continue };
+                all = all.lesser(f32x8::simd_from(simd, of.bounds));
+                sum += of.count;
                 let cost = before + area(simd, all, scale) * as_cost(sum);
                 best = best.min(Split::new(axis, bin, cost));
             }
@@ -261,35 +266,28 @@ impl Bins {
     }
 }
 
-/// Brings the items before a cut to the front; returns how many there are, and the boxes of twice the centres.
+/// Brings the items before a cut to the front; returns how many there are.
 ///
 /// Each item moves to the place behind the first part. The item that was there moves into the gap that the item before
 /// left. Then the first part grows if it has the item (Lomuto's partition as one cycle). No branch depends on the part
 /// to which an item belongs, as that is unpredictable. A choice between two items would become a masked store where the
 /// compiler may use AVX-512, and the next loads would wait for it.
 #[inline(always)]
-fn partition<S: Simd>(
-    simd: S,
-    items: &mut [TriangleItem],
-    rule: &BinScale,
-    cut: &Split,
-) -> (usize, [f32x8<S>; 2]) {
-    let mut centers = [f32x8::splat(simd, f32::INFINITY); 2];
-    let Some(&start) = items.first() else { return (0, centers) };
+fn partition<S: Simd>(simd: S, items: &mut [TriangleItem], rule: &BinScale, cut: &Split) -> usize {
+    let Some(&start) = items.first() else { return 0 };
     let mut middle = 0;
     for gap in 0..items.len() {
         debug_assert!(middle <= gap, "the first part reaches behind the gap");
         // The first item comes last: its place was the first gap.
         let item = items.get(gap + 1).unwrap_or(&start);
         let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
-        grow(simd, &mut centers, is_first, center(load(simd, item)));
         let item = u32x8::simd_from(simd, *item);
         let Some(other) = items.get(middle).or_bug("a place behind the items") else { break };
         put(items, gap, u32x8::simd_from(simd, *other));
         put(items, middle, item);
         middle += usize::from(is_first);
     }
-    (middle, centers)
+    middle
 }
 
 /// Stores an item.
@@ -300,17 +298,14 @@ fn put<S: Simd>(items: &mut [TriangleItem], at: usize, item: u32x8<S>) {
     }
 }
 
-/// Grows the first or the second of two boxes. With vectors both stay in registers.
+/// The box around the boxes of some bins.
 #[inline(always)]
-fn grow<S: Simd>(simd: S, boxes: &mut [f32x8<S>; 2], is_first: bool, by: f32x8<S>) {
-    if !HAS_VECTORS {
-        let side = &mut boxes[usize::from(!is_first)];
-        *side = side.lesser(by);
-        return;
+fn union<S: Simd>(simd: S, bins: &[Bin]) -> Sides {
+    let mut bounds = f32x8::splat(simd, f32::INFINITY);
+    for bin in bins {
+        bounds = bounds.lesser(f32x8::simd_from(simd, bin.bounds));
     }
-    let (mask, nothing) = (mask32x8::splat(simd, is_first), f32x8::splat(simd, f32::INFINITY));
-    boxes[0] = boxes[0].lesser(mask.select(by, nothing));
-    boxes[1] = boxes[1].lesser(mask.select(nothing, by));
+    bounds.into()
 }
 
 /// Bins of each axis for so many items.
@@ -326,6 +321,7 @@ const fn bin_count(items: usize) -> usize {
 mod tests {
     use alloc::format;
     use alloc::vec::Vec;
+    use core::array;
 
     use super::*;
     use crate::random;
@@ -335,12 +331,11 @@ mod tests {
     struct CutOf<'a>(&'a mut [TriangleItem]);
 
     impl Kernel for CutOf<'_> {
-        type Output = Option<(usize, [Extent; 2])>;
+        type Output = Option<(usize, [Sides; 2])>;
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let centers = Extent::of(simd, self.0).centers;
-            Bins::new().cut(simd, self.0, &centers, UNIT)
+            Bins::new().cut(simd, self.0, UNIT)
         }
     }
 
@@ -351,28 +346,34 @@ mod tests {
         [x, y, z, 0.0, u, v, w, 0.0]
     }
 
-    /// The extent of some items, and the cost of entering them.
-    fn extent_of(items: &[TriangleItem]) -> (Extent, f32) {
-        let mut extent = Extent::NOTHING;
-        for sides in items.iter().map(sides_of_item) {
-            let [x, y, z, _, u, v, w, _] = sides;
-            let centers = [x - u, y - v, z - w, 0.0, u - x, v - y, w - z, 0.0];
-            for lane in 0..8 {
-                extent.bounds[lane] = extent.bounds[lane].min(sides[lane]);
-                extent.centers[lane] = extent.centers[lane].min(centers[lane]);
-            }
-        }
-        let size = |axis: usize| (extent.bounds[axis] + extent.bounds[axis + 4]) * UNIT;
+    /// The box of some items, and the cost of entering them.
+    fn box_and_cost(items: &[TriangleItem]) -> (Sides, f32) {
+        let bounds = least(items.iter().map(sides_of_item));
+        let size = |axis: usize| (bounds[axis] + bounds[axis + 4]) * UNIT;
         let (x, y, z) = (size(0), size(1), size(2));
         #[expect(clippy::cast_precision_loss, reason = "small")]
         let count = items.len() as f32;
-        (extent, (x * y + y * z + z * x) * count)
+        (bounds, (x * y + y * z + z * x) * count)
+    }
+
+    /// The least number in each lane.
+    fn least(sides: impl Iterator<Item = Sides>) -> Sides {
+        sides.fold(NOTHING, |all, one| array::from_fn(|lane| all[lane].min(one[lane])))
+    }
+
+    /// The box of twice the centres of some items.
+    fn naive_box_of_centers(items: &[TriangleItem]) -> Sides {
+        least(
+            items.iter().map(sides_of_item).map(|[x, y, z, _, u, v, w, _]| {
+                [x - u, y - v, z - w, 0.0, u - x, v - y, w - z, 0.0]
+            }),
+        )
     }
 
     /// Makes the same cut, found by trying each; of equal ones that of the first axis, then of the last bin. Leaves
     /// both parts in the order of their ids.
-    fn naive(items: &mut [TriangleItem]) -> Option<(usize, [Extent; 2])> {
-        let rule = BinScale::new(items.len(), &extent_of(items).0.centers);
+    fn naive(items: &mut [TriangleItem]) -> Option<(usize, [Sides; 2])> {
+        let rule = BinScale::new(items.len(), &naive_box_of_centers(items));
         let mut best = (f32::INFINITY, 0, 0);
         for axis in (0..3).filter(|&axis| rule.scale[axis] < f32::MAX) {
             for bin in (1..rule.count).rev() {
@@ -381,7 +382,7 @@ mod tests {
                 if first.is_empty() || second.is_empty() {
                     continue;
                 }
-                let cost = extent_of(&first).1 + extent_of(&second).1;
+                let cost = box_and_cost(&first).1 + box_and_cost(&second).1;
                 if cost < best.0 {
                     best = (cost, axis, bin);
                 }
@@ -394,7 +395,7 @@ mod tests {
         let is_first = |item: &TriangleItem| rule.bin_of(item, axis) < bin;
         let middle = items.iter().filter(|item| is_first(item)).count();
         items.sort_by_key(|item| (!is_first(item), item[ID]));
-        Some((middle, [extent_of(&items[..middle]).0, extent_of(&items[middle..]).0]))
+        Some((middle, [box_and_cost(&items[..middle]).0, box_and_cost(&items[middle..]).0]))
     }
 
     #[test]
@@ -425,11 +426,8 @@ mod tests {
                 for level in SimdLevel::available() {
                     let mut items = items.clone();
                     let cut = dispatch(level, CutOf(&mut items));
-                    let parts = |cut: &Option<(usize, [Extent; 2])>| {
-                        cut.map(|(middle, parts)| (middle, parts.map(|p| (p.bounds, p.centers))))
-                    };
                     let case = format!("{level:?}, {count}, {steps}, {flat}");
-                    assert_eq!(parts(&cut), parts(&found), "{case}");
+                    assert_eq!(cut, found, "{case}");
                     // All levels leave the items in the same order.
                     assert_eq!(order.get_or_insert_with(|| items.clone()), &items, "{case}");
                     let (first, second) = items.split_at_mut(middle);

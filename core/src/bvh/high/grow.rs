@@ -2,22 +2,21 @@
 //!
 //! ```text
 //! stack = [all triangles]
-//! pop a range; cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
+//! take the first range on top; cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
-//!     any other part:                         push it
-//! quantise the boxes, write the node
+//! push the other parts; quantise the boxes, write the node
 //! ```
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
-use super::cut::{Bins, Extent, ID, TriangleItem, area};
+use super::cut::{Bins, ID, NOTHING, TriangleItem, area, box_of};
 use crate::aabb::Aabb;
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
-use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH, corners};
+use crate::bvh::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH, corners};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
@@ -77,20 +76,49 @@ struct Job {
     level: u32,
 }
 
-/// Jobs that wait, at most.
-const STACK: usize = (WIDTH - 1) * MOST_LEVELS as usize + 1;
+/// The children of a node.
+#[derive(Clone, Copy)]
+struct Siblings {
+    /// Child `s` holds the items from `ends[s]` to `ends[s + 1]`.
+    ends: [u32; WIDTH + 1],
+    /// Destination of the first that is a node, as in [`Job`]; those of the others follow.
+    place: u32,
+    /// The children that are nodes, as bits.
+    nodes: u8,
+    /// Those of the nodes that are to be made.
+    waiting: u8,
+}
+
+impl Siblings {
+    const NONE: Self = Self { ends: [0; WIDTH + 1], place: 0, nodes: 0, waiting: 0 };
+
+    /// Takes the first node that is to be made; `level` is the number of levels above it.
+    fn next(&mut self, level: u32) -> Option<Job> {
+        if self.waiting == 0 {
+            return None;
+        }
+        let slot = self.waiting.trailing_zeros() as usize % WIDTH;
+        self.waiting &= self.waiting - 1;
+        let before = self.nodes & ((1_u8 << slot) - 1);
+        let place = self.place + before.count_ones();
+        Some(Job { place, start: self.ends[slot], end: self.ends[slot + 1], level })
+    }
+}
+
+/// The most entries on the stack: one a level, and one to spare.
+const STACK: usize = MOST_LEVELS as usize + 1;
 
 /// A part of a range, which becomes a child.
 #[derive(Clone, Copy)]
 struct SubRange {
     start: u32,
     end: u32,
-    extent: Extent,
+    bounds: Sides,
     area: f32,
 }
 
 impl SubRange {
-    const NONE: Self = Self { start: 0, end: 0, extent: Extent::NOTHING, area: 0.0 };
+    const NONE: Self = Self { start: 0, end: 0, bounds: NOTHING, area: 0.0 };
 
     const fn count(&self) -> u32 {
         self.end - self.start
@@ -104,15 +132,21 @@ impl Kernel for Grow<'_, '_> {
     fn run<S: Simd>(mut self, simd: S) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
         let mut bins = Bins::new();
-        let mut stack = [Job { place: 0, start: 0, end: 0, level: 0 }; STACK];
+        // One entry a level: the children of a node, some of which are to be made.
+        let mut stack = [Siblings::NONE; STACK];
         #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
         let end = self.items.len() as u32;
-        stack[0] = Job { place: 0, start: 0, end, level: self.level };
-        let mut jobs = 1;
-        while let Some(job) = usize::checked_sub(jobs, 1).and_then(|last| stack.get(last)).copied()
+        stack[0] = Siblings { nodes: 1, waiting: 1, ..Siblings::NONE };
+        stack[0].ends[1] = end;
+        let mut depth = 1;
+        while let Some(siblings) =
+            u32::checked_sub(depth, 1).and_then(|last| stack.get_mut(last as usize))
         {
-            // Pop a range, and cut it into up to eight parts.
-            jobs -= 1;
+            // Take a range, and cut it into up to eight parts.
+            let Some(job) = siblings.next(self.level + depth - 1) else {
+                depth -= 1;
+                continue;
+            };
             grown.levels = grown.levels.max(job.level + 1);
             let parts = self.parts(simd, &mut bins, &job);
             let mut node = Node {
@@ -122,13 +156,14 @@ impl Kernel for Grow<'_, '_> {
             };
             let mut boxes = [Aabb::EMPTY; WIDTH];
             let mut bounds = Aabb::EMPTY;
-            // Write the ids of leaves, leave ranges to tasks, push the others.
-            let jobs_before = jobs;
+            // Write the ids of leaves, leave ranges to tasks, note the others.
+            let mut below = Siblings { place: grown.nodes + 1, ..Siblings::NONE };
             for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
                 if part.count() == 0 {
                     break;
                 }
-                *bounds_of = corners(&part.extent.bounds);
+                [below.ends[slot % WIDTH], below.ends[slot % WIDTH + 1]] = [part.start, part.end];
+                *bounds_of = corners(&part.bounds);
                 bounds = bounds.union(bounds_of);
                 if part.count() <= LEAF as u32 {
                     #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
@@ -145,29 +180,21 @@ impl Kernel for Grow<'_, '_> {
                     continue;
                 }
                 node.set_inner(slot);
-                let place = grown.nodes;
-                grown.nodes += 1;
-                let (start, end) = (part.start, part.end);
-                let below = Job { place: place + 1, start, end, level: job.level + 1 };
+                below.nodes |= 1 << (slot % WIDTH);
                 // Too little room for nodes is legal: they are counted.
-                match self.nodes.get_mut(place as usize) {
+                match self.nodes.get_mut(grown.nodes as usize) {
                     Some(node) if part.count() <= self.wait => {
-                        *node = Node::unbuilt(start, end, below.level);
+                        *node = Node::unbuilt(part.start, part.end, job.level + 1);
                     }
-                    _ => {
-                        if let Some(slot) = stack.get_mut(jobs).or_bug("too many jobs wait") {
-                            *slot = below;
-                            jobs += 1;
-                        }
-                    }
+                    _ => below.waiting |= 1 << (slot % WIDTH),
                 }
+                grown.nodes += 1;
             }
-            // Reverse them, so that the first child comes next. `reverse` is unrolled, which takes more flash.
-            let pushed = stack.get_mut(jobs_before..jobs).or_bug("jobs that do not wait");
-            let mut pushed = pushed.unwrap_or_default();
-            while let [first, between @ .., last] = pushed {
-                core::mem::swap(first, last);
-                pushed = between;
+            if below.waiting != 0
+                && let Some(slot) = stack.get_mut(depth as usize).or_bug("too many levels")
+            {
+                *slot = below;
+                depth += 1;
             }
             // Quantise the boxes, and write the node.
             node.set_boxes(&bounds, &boxes, self.least);
@@ -209,9 +236,7 @@ impl Grow<'_, '_> {
             job.start <= job.end && job.end as usize <= self.items.len(),
             "a job behind the items"
         );
-        let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
-        let extent = Extent::of(simd, all);
-        parts[0] = SubRange { start: job.start, end: job.end, extent, area: 0.0 };
+        parts[0] = SubRange { start: job.start, end: job.end, bounds: NOTHING, area: 0.0 };
         let halve = job.level >= HALVED_FROM;
         for count in 1..WIDTH {
             let Some(at) = choose(&parts, halve) else { break };
@@ -219,35 +244,37 @@ impl Grow<'_, '_> {
             let part = parts[at];
             let range = part.start as usize..part.end as usize;
             let Some(items) = self.items.get_mut(range).or_bug("a part too long") else { break };
-            let found =
-                if halve { None } else { bins.cut(simd, items, &part.extent.centers, self.unit) };
-            let (middle, extents) =
-                if let Some(found) = found { found } else { halves(simd, items) };
+            let found = if halve { None } else { bins.cut(simd, items, self.unit) };
+            let (middle, boxes) = if let Some(found) = found { found } else { halves(simd, items) };
             #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
             let middle = part.start + middle as u32;
-            let [first, second] = extents;
-            let area =
-                |extent: &Extent| area(simd, f32x8::simd_from(simd, extent.bounds), self.unit);
+            let [first, second] = boxes;
+            let area = |bounds: &Sides| area(simd, f32x8::simd_from(simd, *bounds), self.unit);
             // The parts behind it make room for its second half.
             let mut next =
-                SubRange { start: middle, end: part.end, extent: second, area: area(&second) };
+                SubRange { start: middle, end: part.end, bounds: second, area: area(&second) };
             parts[at] =
-                SubRange { start: part.start, end: middle, extent: first, area: area(&first) };
+                SubRange { start: part.start, end: middle, bounds: first, area: area(&first) };
             for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
                 next = core::mem::replace(slot, next);
             }
+        }
+        if parts[1].count() == 0 {
+            // It was small already, so that no cut has found its box.
+            let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
+            parts[0].bounds = box_of(simd, all);
         }
         parts
     }
 }
 
-/// The extents of the first and the second half of some items.
+/// The boxes of the first and the second half of some items.
 #[inline(always)]
-fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
+fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Sides; 2]) {
     let middle = items.len() / 2;
     let halves = items.split_at_checked(middle).or_bug("a middle behind the items");
     let (first, second) = halves.unwrap_or_default();
-    (middle, [Extent::of(simd, first), Extent::of(simd, second)])
+    (middle, [box_of(simd, first), box_of(simd, second)])
 }
 
 /// Chooses the part to cut next: of parts too large for a leaf the one with the largest surface, then of leaves the one
