@@ -1,11 +1,12 @@
 //! Grows the nodes over a range of triangles from the root down, each with eight children.
 //!
 //! ```text
-//! stack = [all triangles]
-//! take the first range on top; cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
+//! stack = [[all triangles]]
+//! take the first range of the entry on top
+//! cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
-//! push the other parts; quantise the boxes, write the node
+//! push the other parts as one entry; quantise the boxes, write the node
 //! ```
 
 use fearless_simd::prelude::*;
@@ -81,12 +82,12 @@ struct Job {
 struct Siblings {
     /// Child `s` holds the items from `ends[s]` to `ends[s + 1]`.
     ends: [u32; WIDTH + 1],
-    /// Destination of the first that is a node, as in [`Job`]; those of the others follow.
+    /// Destination of the first child that is a node, as in [`Job`]; those of the other nodes follow.
     place: u32,
     /// The children that are nodes, as bits.
-    nodes: u8,
-    /// Those of the nodes that are to be made.
-    waiting: u8,
+    nodes: u32,
+    /// Those of them that are still to be made. The others are made, or are left to tasks.
+    waiting: u32,
 }
 
 impl Siblings {
@@ -99,14 +100,11 @@ impl Siblings {
         }
         let slot = self.waiting.trailing_zeros() as usize % WIDTH;
         self.waiting &= self.waiting - 1;
-        let before = self.nodes & ((1_u8 << slot) - 1);
+        let before = self.nodes & ((1 << slot) - 1);
         let place = self.place + before.count_ones();
         Some(Job { place, start: self.ends[slot], end: self.ends[slot + 1], level })
     }
 }
-
-/// The most entries on the stack: one a level, and one to spare.
-const STACK: usize = MOST_LEVELS as usize + 1;
 
 /// A part of a range, which becomes a child.
 #[derive(Clone, Copy)]
@@ -132,8 +130,8 @@ impl Kernel for Grow<'_, '_> {
     fn run<S: Simd>(mut self, simd: S) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
         let mut bins = Bins::new();
-        // One entry a level: the children of a node, some of which are to be made.
-        let mut stack = [Siblings::NONE; STACK];
+        // One entry a level. Begin with the root, as the only child of no node.
+        let mut stack = [Siblings::NONE; MOST_LEVELS as usize];
         #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
         let end = self.items.len() as u32;
         stack[0] = Siblings { nodes: 1, waiting: 1, ..Siblings::NONE };
@@ -180,7 +178,6 @@ impl Kernel for Grow<'_, '_> {
                     continue;
                 }
                 node.set_inner(slot);
-                below.nodes |= 1 << (slot % WIDTH);
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(grown.nodes as usize) {
                     Some(node) if part.count() <= self.wait => {
@@ -190,6 +187,7 @@ impl Kernel for Grow<'_, '_> {
                 }
                 grown.nodes += 1;
             }
+            below.nodes = node.inner();
             if below.waiting != 0
                 && let Some(slot) = stack.get_mut(depth as usize).or_bug("too many levels")
             {
@@ -260,7 +258,7 @@ impl Grow<'_, '_> {
             }
         }
         if parts[1].count() == 0 {
-            // It was small already, so that no cut has found its box.
+            // The range is small, so nothing was cut: find its box here.
             let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
             parts[0].bounds = box_of(simd, all);
         }
