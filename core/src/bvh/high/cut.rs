@@ -10,6 +10,8 @@
 //! A box is one vector: least x, y, z and minus greatest x, y, z. So the union of two boxes is one minimum,
 //! and the vector minus itself with its halves swapped is twice the centre.
 
+use core::mem::offset_of;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x8};
 use zerocopy::FromZeros;
@@ -43,9 +45,12 @@ const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
 #[derive(Debug, Clone, Copy, FromZeros)]
 struct Bin {
     count: u32,
+    /// Moves the box off the multiples of 16 bytes.
     _off: u32,
     bounds: Sides,
 }
+
+const _: () = assert!(size_of::<Bin>() == 64 && offset_of!(Bin, bounds) % 16 == 8);
 
 /// The bins of a range on each axis.
 #[derive(FromZeros)]
@@ -190,7 +195,8 @@ impl Split {
 }
 
 impl Bins {
-    /// Bins of zeros, which the compiler writes in place. [`fill`](Self::fill) sets a bin before it is read.
+    /// Bins of zeros: the compiler clears them where they lie, without a copy. [`fill`](Self::fill) sets a bin before
+    /// it is read.
     pub(super) fn new() -> Self {
         Self::new_zeroed()
     }
@@ -206,16 +212,16 @@ impl Bins {
     ) -> Option<(usize, [Sides; 2])> {
         let rule = BinScale::new(items.len(), &box_of_centers(simd, items));
         self.fill(simd, items, &rule);
-        let place = self.best(simd, &rule, scale)?;
-        let bins = self.0[place.axis()].get(..rule.count).unwrap_or_default();
-        let parts = bins.split_at_checked(place.bin()).or_bug("a cut behind the bins");
+        let split = self.best(simd, &rule, scale)?;
+        let bins = self.0[split.axis()].get(..rule.count).unwrap_or_default();
+        let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
         let (first, second) = parts.unwrap_or_default();
         let boxes = [union(simd, first), union(simd, second)];
-        let middle = partition(simd, items, &rule, &place);
+        let middle = partition(simd, items, &rule, &split);
         (middle > 0 && middle < items.len()).then_some((middle, boxes))
     }
 
-    /// Grows the boxes of the bins, and counts.
+    /// Empties the bins, then adds each item to one bin of each axis.
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, items: &[TriangleItem], rule: &BinScale) {
         for bins in &mut self.0 {
@@ -254,12 +260,12 @@ impl Bins {
             }
             // Add those of what is behind.
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
-            for bin in (1..rule.count).rev() {
-                let (Some(of), Some(before)) = (bins.get(bin), costs.get(bin)) else { continue };
-                all = all.lesser(f32x8::simd_from(simd, of.bounds));
-                sum += of.count;
+            for at in (1..rule.count).rev() {
+                let (Some(bin), Some(before)) = (bins.get(at), costs.get(at)) else { continue };
+                all = all.lesser(f32x8::simd_from(simd, bin.bounds));
+                sum += bin.count;
                 let cost = before + area(simd, all, scale) * as_cost(sum);
-                best = best.min(Split::new(axis, bin, cost));
+                best = best.min(Split::new(axis, at, cost));
             }
         }
         (best < Split::NONE).then_some(best)
@@ -273,14 +279,19 @@ impl Bins {
 /// to which an item belongs, as that is unpredictable. A choice between two items would become a masked store where the
 /// compiler may use AVX-512, and the next loads would wait for it.
 #[inline(always)]
-fn partition<S: Simd>(simd: S, items: &mut [TriangleItem], rule: &BinScale, cut: &Split) -> usize {
+fn partition<S: Simd>(
+    simd: S,
+    items: &mut [TriangleItem],
+    rule: &BinScale,
+    split: &Split,
+) -> usize {
     let Some(&start) = items.first() else { return 0 };
     let mut middle = 0;
     for gap in 0..items.len() {
         debug_assert!(middle <= gap, "the first part reaches behind the gap");
         // The first item comes last: its place was the first gap.
         let item = items.get(gap + 1).unwrap_or(&start);
-        let is_first = rule.bin_of(item, cut.axis()) < cut.bin();
+        let is_first = rule.bin_of(item, split.axis()) < split.bin();
         let item = u32x8::simd_from(simd, *item);
         let Some(other) = items.get(middle).or_bug("a place behind the items") else { break };
         put(items, gap, u32x8::simd_from(simd, *other));
@@ -327,7 +338,7 @@ mod tests {
     use crate::random;
     use crate::simd::{Kernel, SimdLevel, dispatch};
 
-    /// Finds the box of the centres of items, and cuts the items, in bins that others were in before.
+    /// Finds the box of twice the centres of some items, then cuts them, with bins that earlier cuts have used.
     struct CutOf<'a>(&'a mut [TriangleItem], &'a mut Bins);
 
     impl Kernel for CutOf<'_> {
@@ -403,6 +414,7 @@ mod tests {
     fn the_cheapest_cut_is_found_alike_with_all_vectors() {
         let mut state = 1;
         let mut bins = Bins::new();
+        // The first count uses all bins. Later cuts must not read what it left there.
         for count in [400_u32, 2, 5, 7, 8, 9, 32, 33, 100, 256, 257, 259] {
             // Coordinates of few bits make ties. In the last three kinds the centres lie in a plane, on a line and in
             // one place.

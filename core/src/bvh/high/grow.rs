@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! stack = [[all triangles]]
-//! take the first range of the entry on top
+//! take the next range of the entry on top; drop the entry if it has none
 //! cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
@@ -70,10 +70,11 @@ pub(super) struct Grown {
 /// A node to be made.
 #[derive(Clone, Copy)]
 struct Job {
-    /// Destination of the node: 0 for the root, otherwise one more than its place.
+    /// Destination of the node: 0 for the root, `i + 1` for [`Grow::nodes`]`[i]`.
     place: u32,
     start: u32,
     end: u32,
+    /// Levels of nodes above.
     level: u32,
 }
 
@@ -82,24 +83,24 @@ struct Job {
 struct Siblings {
     /// Child `s` holds the items from `ends[s]` to `ends[s + 1]`.
     ends: [u32; WIDTH + 1],
-    /// Destination of the first child that is a node, as in [`Job`]; those of the other nodes follow.
+    /// Destination of the first child that is a node, as in [`Job::place`]. The other nodes follow it.
     place: u32,
     /// The children that are nodes, as bits.
     nodes: u32,
-    /// Those of them that are still to be made. The others are made, or are left to tasks.
-    waiting: u32,
+    /// Those of them that are still to be made here. The others are made already, or left to tasks.
+    to_make: u32,
 }
 
 impl Siblings {
-    const NONE: Self = Self { ends: [0; WIDTH + 1], place: 0, nodes: 0, waiting: 0 };
+    const NONE: Self = Self { ends: [0; WIDTH + 1], place: 0, nodes: 0, to_make: 0 };
 
-    /// Takes the first node that is to be made; `level` is the number of levels above it.
+    /// Takes the first child that is still to be made, if there is one. Above it are `level` levels of nodes.
     fn next(&mut self, level: u32) -> Option<Job> {
-        if self.waiting == 0 {
+        if self.to_make == 0 {
             return None;
         }
-        let slot = self.waiting.trailing_zeros() as usize % WIDTH;
-        self.waiting &= self.waiting - 1;
+        let slot = self.to_make.trailing_zeros() as usize % WIDTH;
+        self.to_make &= self.to_make - 1;
         let before = self.nodes & ((1 << slot) - 1);
         let place = self.place + before.count_ones();
         Some(Job { place, start: self.ends[slot], end: self.ends[slot + 1], level })
@@ -130,11 +131,11 @@ impl Kernel for Grow<'_, '_> {
     fn run<S: Simd>(mut self, simd: S) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
         let mut bins = Bins::new();
-        // One entry a level. Begin with the root, as the only child of no node.
+        // One entry a level: under the nodes of an entry are those of the next. The first entry holds the root alone.
         let mut stack = [Siblings::NONE; MOST_LEVELS as usize];
         #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
         let end = self.items.len() as u32;
-        stack[0] = Siblings { nodes: 1, waiting: 1, ..Siblings::NONE };
+        stack[0] = Siblings { nodes: 1, to_make: 1, ..Siblings::NONE };
         stack[0].ends[1] = end;
         let mut depth = 1;
         while let Some(siblings) =
@@ -180,15 +181,15 @@ impl Kernel for Grow<'_, '_> {
                 node.set_inner(slot);
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(grown.nodes as usize) {
-                    Some(node) if part.count() <= self.wait => {
-                        *node = Node::unbuilt(part.start, part.end, job.level + 1);
+                    Some(unbuilt) if part.count() <= self.wait => {
+                        *unbuilt = Node::unbuilt(part.start, part.end, job.level + 1);
                     }
-                    _ => below.waiting |= 1 << (slot % WIDTH),
+                    _ => below.to_make |= 1 << (slot % WIDTH),
                 }
                 grown.nodes += 1;
             }
             below.nodes = node.inner();
-            if below.waiting != 0
+            if below.to_make != 0
                 && let Some(slot) = stack.get_mut(depth as usize).or_bug("too many levels")
             {
                 *slot = below;
@@ -258,7 +259,7 @@ impl Grow<'_, '_> {
             }
         }
         if parts[1].count() == 0 {
-            // The range is small, so nothing was cut: find its box here.
+            // Only a root of at most `SMALL_LEAF` triangles is not cut. Find its box here.
             let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
             parts[0].bounds = box_of(simd, all);
         }
@@ -266,7 +267,7 @@ impl Grow<'_, '_> {
     }
 }
 
-/// The boxes of the first and the second half of some items.
+/// The number of items in the first half, and the boxes of both halves.
 #[inline(always)]
 fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Sides; 2]) {
     let middle = items.len() / 2;
