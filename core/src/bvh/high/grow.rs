@@ -87,7 +87,7 @@ struct Siblings {
     place: u32,
     /// The children that are nodes, as bits.
     nodes: u32,
-    /// Those of them that are still to be made here. The others are made already, or left to tasks.
+    /// The nodes that are still to be made here, as bits. The others exist already, or a task makes them.
     to_make: u32,
 }
 
@@ -157,11 +157,12 @@ impl Kernel for Grow<'_, '_> {
             let mut bounds = Aabb::EMPTY;
             // Write the ids of leaves, leave ranges to tasks, note the others.
             let mut below = Siblings { place: grown.nodes + 1, ..Siblings::NONE };
+            below.ends[0] = job.start;
             for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
                 if part.count() == 0 {
                     break;
                 }
-                [below.ends[slot % WIDTH], below.ends[slot % WIDTH + 1]] = [part.start, part.end];
+                below.ends[slot % WIDTH + 1] = part.end;
                 *bounds_of = corners(&part.bounds);
                 bounds = bounds.union(bounds_of);
                 if part.count() <= LEAF as u32 {
