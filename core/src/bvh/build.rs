@@ -450,16 +450,15 @@ impl BuildInputs<'_> {
         Ok(all)
     }
 
-    /// Finds the ends of the units of each task, at seams: about as many entries for each.
+    /// Finds the ends of the units of each task: the seams nearest to equal shares of the entries.
     fn cut(&self, ends: &mut [usize], tasks: usize, entries: usize) {
-        let mut units = Units::new(self.sizes);
-        let mut end = 0;
+        let units = Units::new(self.sizes).filter(|unit| is_seam(unit) || unit.end == entries);
+        let mut seams = units.map(|unit| unit.end).peekable();
+        let mut end = 0_usize;
         for (task, slot) in ends.iter_mut().enumerate().take(tasks) {
             let goal = share(entries, task, tasks).end;
-            while end < goal
-                && let Some(unit) = units.find(|unit| is_seam(unit) || unit.end == entries)
-            {
-                end = unit.end;
+            while let Some(seam) = seams.next_if(|seam| seam.abs_diff(goal) <= end.abs_diff(goal)) {
+                end = seam;
             }
             *slot = end;
         }
@@ -523,4 +522,33 @@ struct TaskTotals {
     roots: u32,
     /// The record of the last root.
     last: RootRecord,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_end_at_the_seams_nearest_to_their_shares() {
+        let (positions, indices) = ([[0.0; 3]; 3], [[0, 1, 2]]);
+        let mesh = &TriangleMesh::new(&positions, &indices).unwrap();
+        let sizes = &[64; 5 * SEAM / 64];
+        let work = BuildInputs { mesh, least: 1.0, sizes, shift: 0 };
+        let ends_of = |tasks: usize| {
+            let mut ends = [0; tasks::MOST];
+            work.cut(&mut ends, tasks, 5 * SEAM);
+            ends
+        };
+        // A unit that begins before a seam ends behind it.
+        let seam = |number: usize| number * SEAM;
+        let is_near = |end: usize, number: usize| end >= seam(number) && end < seam(number) + 128;
+        let [first, last, ..] = ends_of(2);
+        assert!((is_near(first, 2) || is_near(first, 3)) && last == seam(5), "{first}, {last}");
+        let [first, second, last, ..] = ends_of(3);
+        assert!(is_near(first, 2) && is_near(second, 3) && last == seam(5), "{first}, {second}");
+        assert_eq!(ends_of(1)[0], seam(5));
+        // More tasks than seams: some have nothing, the last one ends with the entries.
+        let ends = ends_of(tasks::MOST);
+        assert!(ends.is_sorted() && ends[tasks::MOST - 1] == seam(5));
+    }
 }
