@@ -450,8 +450,8 @@ impl BuildInputs<'_> {
         Ok(all)
     }
 
-    /// Finds the ends of the units of each task: the seams nearest to the ends of equal shares of the entries. Any task
-    /// may have no entries; the last one ends with all of them.
+    /// Finds where the units of each task end: at the seam nearest to the end of an equal share of the entries. A task
+    /// may have no entries, and the last one ends behind the last entry.
     fn cut(&self, ends: &mut [usize], tasks: usize, entries: usize) {
         let units = Units::new(self.sizes).filter(|unit| is_seam(unit) || unit.end == entries);
         let mut seams = units.map(|unit| unit.end).peekable();
