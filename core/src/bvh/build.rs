@@ -34,9 +34,11 @@
 use core::ops::Range;
 
 use fearless_simd::Simd;
+use glam::Vec3A;
 use zerocopy::{FromZeros, IntoBytes};
 
 use super::census::{Census, count};
+use super::cut::{Item, item};
 use super::fine::{FineList, FineSides, most_fine};
 use super::high;
 use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
@@ -49,7 +51,7 @@ use super::node::{Node, least_node};
 use super::roots::{RECORD, RootRecord, Roots};
 use super::scatter::{place_tasks, scatter};
 use super::subtree::Subtree;
-use super::top::{self, ITEM, RootItem, Top};
+use super::top::{self, ITEM, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
 use crate::arena::{Sizes, first_mut, move_down, split_mut, whole};
@@ -226,7 +228,8 @@ fn build_in(
     watch.at(ROOTS)?;
     let (ids, nodes) = cut_index(&mut index, finite);
     let bounds = Lattice::pad(&bounds);
-    let work = BuildInputs { mesh, least: least_node(&bounds), sizes, shift: KEY_BITS - bits };
+    let (least, shift) = (least_node(&bounds), KEY_BITS - bits);
+    let work = BuildInputs { mesh, bounds, least, sizes, shift };
     let roots = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
 
     // Build the tree on top of them.
@@ -280,6 +283,8 @@ fn vertex_bounds(
 /// The inputs that the steps after binning share.
 struct BuildInputs<'w> {
     mesh: &'w TriangleMesh<'w>,
+    /// The box of the tree.
+    bounds: Aabb,
     /// [`least_node`] of the tree.
     least: f32,
     /// Entries of each bin.
@@ -317,7 +322,7 @@ impl Kernel for UnitsTask<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Self::Output {
         let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
-        let BuildInputs { mesh, least, sizes, shift } = *work;
+        let BuildInputs { mesh, least, sizes, shift, .. } = *work;
         let first = range.start as u32;
         let mut roots = Roots {
             mesh,
@@ -491,7 +496,7 @@ impl BuildInputs<'_> {
         let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
         let records = &*whole::<RootRecord>(records.as_mut_bytes());
         let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
-        let items = whole::<RootItem>(items.as_mut_bytes());
+        let items = whole::<Item>(items.as_mut_bytes());
         let mut room = whole::<FineSides>(rest.as_mut_bytes());
         let most = most_fine(self.mesh.triangle_count().into());
         let mut fine = FineList::new(take_up_to(&mut room, most as usize));
@@ -500,11 +505,11 @@ impl BuildInputs<'_> {
             record.map_or((Node::EMPTY, 0), |r| (r.node, r.levels))
         };
         let mut build = |nodes: &mut [Node]| {
-            for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
-                let RootRecord { min, max, count, .. } = *record;
-                *item = RootItem { min, max, count, record: at };
+            for (at, (slot, record)) in (0..).zip(items.iter_mut().zip(records)) {
+                let (min, max) = (Vec3A::from_array(record.min), Vec3A::from_array(record.max));
+                *slot = item(&Aabb { min, max }, at, record.count.div_ceil(4));
             }
-            top::build(items, record, nodes, all.nodes, self.least, &mut fine)
+            top::build(items, &self.bounds, record, nodes, all.nodes, self.least, &mut fine)
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
         let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;
@@ -534,7 +539,7 @@ mod tests {
         let (positions, indices) = ([[0.0; 3]; 3], [[0, 1, 2]]);
         let mesh = &TriangleMesh::new(&positions, &indices).unwrap();
         let sizes = &[64; 5 * SEAM / 64];
-        let work = BuildInputs { mesh, least: 1.0, sizes, shift: 0 };
+        let work = BuildInputs { mesh, bounds: Aabb::EMPTY, least: 1.0, sizes, shift: 0 };
         let ends_of = |tasks: usize| {
             let mut ends = [0; tasks::MOST];
             work.cut(&mut ends, tasks, 5 * SEAM);

@@ -17,7 +17,8 @@
 //!
 //! ```text
 //! format         node, fine, layout, validate
-//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`
+//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`;
+//!                parts (cut) for top and high/
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays, group (boxes, met, group_leaf), interleave
 //! points         nearest
@@ -41,6 +42,7 @@ mod boxes;
 mod build;
 mod census;
 mod crowd;
+mod cut;
 mod fine;
 mod group;
 mod group_leaf;
@@ -53,6 +55,7 @@ mod met;
 mod nearest;
 mod node;
 mod order;
+mod parts;
 mod rays;
 mod refit;
 mod roots;

@@ -3,23 +3,21 @@
 //! ```text
 //! stack = [[all triangles]]
 //! take the next range of the entry on top; drop the entry if it has none
-//! cut it until there are eight parts, or all have four triangles or fewer (cut.rs)
+//! cut it until there are eight parts, or all have four triangles or fewer (parts.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
 //! push the other parts as one entry; quantise the boxes, write the node
 //! ```
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8};
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
-use super::cut::{Bins, ID, NOTHING, TriangleItem, area, box_of};
 use crate::aabb::Aabb;
+use crate::bvh::cut::{ID, Item};
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
-use crate::bvh::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH, corners};
+use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH};
+use crate::bvh::parts::{Cutter, Limits};
 use crate::invariant::OrBug;
-use crate::simd::Kernel;
 
 /// The level from which on ranges are halved.
 const HALVED_FROM: u32 = 24;
@@ -30,10 +28,15 @@ pub(super) const MOST_LEVELS: u32 = HALVED_FROM + 11;
 
 const _: () = assert!(MOST_LEVELS <= LEVELS);
 
+/// How ranges of triangles are cut.
+const LIMITS: Limits = Limits { leaf: LEAF as u32, small: SMALL_LEAF as u32, bins: 32 };
+
 /// A range of triangles over which nodes are to be made.
 pub(super) struct Grow<'w, 'f> {
+    /// The box around all triangles of the tree.
+    pub(super) bounds: &'w Aabb,
     /// The triangles, in any order that the mesh alone determines.
-    pub(super) items: &'w mut [TriangleItem],
+    pub(super) items: &'w mut [Item],
     /// Levels of nodes above.
     pub(super) level: u32,
     /// A range of at most this many triangles is left to a task: its node stores the range, if there is room
@@ -49,8 +52,6 @@ pub(super) struct Grow<'w, 'f> {
     pub(super) ids: &'w mut [u32],
     /// Place of the first of them in the index.
     pub(super) first: u32,
-    /// The factor that scales lengths before areas are computed from them.
-    pub(super) unit: f32,
     /// [`least_node`](crate::bvh::node::least_node) of the tree.
     pub(super) least: f32,
 }
@@ -107,30 +108,12 @@ impl Siblings {
     }
 }
 
-/// A part of a range, which becomes a child.
-#[derive(Clone, Copy)]
-struct SubRange {
-    start: u32,
-    end: u32,
-    bounds: Sides,
-    area: f32,
-}
-
-impl SubRange {
-    const NONE: Self = Self { start: 0, end: 0, bounds: NOTHING, area: 0.0 };
-
-    const fn count(&self) -> u32 {
-        self.end - self.start
-    }
-}
-
-impl Kernel for Grow<'_, '_> {
-    type Output = Grown;
-
-    #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) -> Grown {
+impl Grow<'_, '_> {
+    /// Makes the nodes. Out of line: the bins shall leave the stack before the next range comes.
+    #[inline(never)]
+    pub(super) fn run(mut self) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
-        let mut bins = Bins::new();
+        let mut cutter = Cutter::new(self.bounds, LIMITS);
         // One entry a level: under the nodes of an entry are those of the next. The first entry holds the root alone.
         let mut stack = [Siblings::NONE; MOST_LEVELS as usize];
         #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
@@ -147,28 +130,21 @@ impl Kernel for Grow<'_, '_> {
                 continue;
             };
             grown.levels = grown.levels.max(job.level + 1);
-            let parts = self.parts(simd, &mut bins, &job);
+            let halve = job.level >= HALVED_FROM;
+            let parts = cutter.parts(self.items, &(job.start..job.end), halve);
             let mut node = Node {
                 child: self.child + grown.nodes,
                 first: self.first + grown.ids,
                 ..Node::EMPTY
             };
-            let mut boxes = [Aabb::EMPTY; WIDTH];
-            let mut bounds = Aabb::EMPTY;
             // Write the ids of leaves, leave ranges to tasks, note the others.
-            let mut below = Siblings { place: grown.nodes + 1, ..Siblings::NONE };
-            below.ends[0] = job.start;
-            for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
-                if part.count() == 0 {
-                    break;
-                }
-                below.ends[slot % WIDTH + 1] = part.end;
-                *bounds_of = corners(&part.bounds);
-                bounds = bounds.union(bounds_of);
-                if part.count() <= LEAF as u32 {
+            let mut below = Siblings { ends: parts.ends, place: grown.nodes + 1, ..Siblings::NONE };
+            for (slot, part) in parts.ranges().enumerate() {
+                let count = part.end - part.start;
+                if count <= LEAF as u32 {
                     #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
-                    let count = part.count() as u8;
-                    node.counts[slot % WIDTH] = count;
+                    let in_leaf = count as u8;
+                    node.counts[slot % WIDTH] = in_leaf;
                     let items = self.items.get(part.start as usize..part.end as usize);
                     debug_assert!(items.is_some(), "a leaf behind the items");
                     // Too little room for ids is legal: they are counted.
@@ -176,13 +152,13 @@ impl Kernel for Grow<'_, '_> {
                     for (id, item) in ids.iter_mut().zip(items.unwrap_or_default()) {
                         *id = item[ID];
                     }
-                    grown.ids += part.count();
+                    grown.ids += count;
                     continue;
                 }
                 node.set_inner(slot);
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(grown.nodes as usize) {
-                    Some(unbuilt) if part.count() <= self.wait => {
+                    Some(unbuilt) if count <= self.wait => {
                         *unbuilt = Node::unbuilt(part.start, part.end, job.level + 1);
                     }
                     _ => below.to_make |= 1 << (slot % WIDTH),
@@ -197,8 +173,8 @@ impl Kernel for Grow<'_, '_> {
                 depth += 1;
             }
             // Quantise the boxes, and write the node.
-            node.set_boxes(&bounds, &boxes, self.least);
-            self.add_fine_sides(&job, &mut node, &boxes);
+            node.set_boxes(&parts.bounds(), &parts.boxes, self.least);
+            self.add_fine_sides(&job, &mut node, &parts.boxes);
             match job.place.checked_sub(1) {
                 None => grown.root = node,
                 Some(place) => {
@@ -210,9 +186,7 @@ impl Kernel for Grow<'_, '_> {
         }
         grown
     }
-}
 
-impl Grow<'_, '_> {
     /// Gives fine sides to a node, if it is one of the top nodes, none of its children is a leaf, and one of them is
     /// thin.
     #[inline(never)]
@@ -227,80 +201,6 @@ impl Grow<'_, '_> {
             fine.add(number, node, boxes);
         }
     }
-
-    /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer.
-    #[inline(always)]
-    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [SubRange; WIDTH] {
-        let mut parts = [SubRange::NONE; WIDTH];
-        debug_assert!(
-            job.start <= job.end && job.end as usize <= self.items.len(),
-            "a job behind the items"
-        );
-        parts[0] = SubRange { start: job.start, end: job.end, bounds: NOTHING, area: 0.0 };
-        let halve = job.level >= HALVED_FROM;
-        for count in 1..WIDTH {
-            let Some(at) = choose(&parts, halve) else { break };
-            let at = at % WIDTH;
-            let part = parts[at];
-            let range = part.start as usize..part.end as usize;
-            let Some(items) = self.items.get_mut(range).or_bug("a part too long") else { break };
-            let found = if halve { None } else { bins.cut(simd, items, self.unit) };
-            let (middle, boxes) = if let Some(found) = found { found } else { halves(simd, items) };
-            #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
-            let middle = part.start + middle as u32;
-            let [first, second] = boxes;
-            let area = |bounds: &Sides| area(simd, f32x8::simd_from(simd, *bounds), self.unit);
-            // The parts behind it make room for its second half.
-            let mut next =
-                SubRange { start: middle, end: part.end, bounds: second, area: area(&second) };
-            parts[at] =
-                SubRange { start: part.start, end: middle, bounds: first, area: area(&first) };
-            for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
-                next = core::mem::replace(slot, next);
-            }
-        }
-        if parts[1].count() == 0 {
-            // Only a root of at most `SMALL_LEAF` triangles is not cut. Find its box here.
-            let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
-            parts[0].bounds = box_of(simd, all);
-        }
-        parts
-    }
-}
-
-/// The number of items in the first half, and the boxes of both halves.
-#[inline(always)]
-fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Sides; 2]) {
-    let middle = items.len() / 2;
-    let halves = items.split_at_checked(middle).or_bug("a middle behind the items");
-    let (first, second) = halves.unwrap_or_default();
-    (middle, [box_of(simd, first), box_of(simd, second)])
-}
-
-/// Chooses the part to cut next: of parts too large for a leaf the one with the largest surface, then of leaves the one
-/// with the largest surface times count; where parts are halved, the one with the most triangles. `None` if all are
-/// small.
-#[inline(always)]
-fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
-    let mut best = None;
-    let mut most = (false, -1.0, 0);
-    for (at, part) in parts.iter().enumerate() {
-        if part.count() <= SMALL_LEAF as u32 {
-            continue;
-        }
-        let is_node = part.count() > LEAF as u32;
-        #[expect(clippy::cast_precision_loss, reason = "a priority")]
-        let priority = match (halve, is_node) {
-            (true, _) => part.count() as f32,
-            (false, true) => part.area,
-            (false, false) => part.area * part.count() as f32,
-        };
-        let priority = (is_node, priority, part.count());
-        if priority > most {
-            (best, most) = (Some(at), priority);
-        }
-    }
-    best
 }
 
 /// The nodes that wait in a tree, in the order of their triangles.
@@ -362,7 +262,6 @@ pub(super) struct RangeRecord {
 }
 
 /// A record in items.
-pub(super) const RECORD: usize = size_of::<RangeRecord>() / size_of::<TriangleItem>();
+pub(super) const RECORD: usize = size_of::<RangeRecord>() / size_of::<Item>();
 
-const _: () =
-    assert!(size_of::<RangeRecord>() == RECORD * size_of::<TriangleItem>() && RECORD <= LEAF);
+const _: () = assert!(size_of::<RangeRecord>() == RECORD * size_of::<Item>() && RECORD <= LEAF);

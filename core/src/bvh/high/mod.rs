@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! boxes     the box of each triangle, with its id: an item                  (mod.rs)
-//! top       nodes over all items, until ranges are small enough for tasks   (grow.rs, cut.rs)
+//! top       nodes over all items, until ranges are small enough for tasks   (grow.rs)
 //! below     the nodes over each of these ranges
 //!
 //! index   | header | ids: of top nodes' leaves, then of each range | nodes: top | below each range |
@@ -23,13 +23,12 @@
     reason = "numbers of triangles and nodes, which fit into 32 bits"
 )]
 
-mod cut;
 mod grow;
 
 use fearless_simd::Simd;
-use glam::Vec3A;
 use zerocopy::transmute;
 
+use super::cut::{Item, item};
 use super::fine::{FineList, FineSides, most_fine};
 use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
 use super::layout::index_bytes;
@@ -47,7 +46,6 @@ use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::survey::finite_box;
 use crate::tasks::{self, run, share, take, take_up_to, task_count};
-use cut::TriangleItem;
 use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
 /// The most nodes of a tree over so many triangles.
@@ -63,7 +61,7 @@ pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
     let index = index_bytes(triangles, nodes, most_fine(triangles));
-    let scratch = section_bytes::<TriangleItem>(items);
+    let scratch = section_bytes::<Item>(items);
     (index, scratch + section_bytes::<FineSides>(most_fine(triangles)))
 }
 
@@ -95,7 +93,7 @@ pub(super) fn build_in(
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let (index_bound, needed_bytes) = bound(triangles);
     let scratch = first_mut(scratch, needed_bytes, Region::Scratch)?;
-    let split = split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch");
+    let split = split_mut::<Item>(scratch, triangles.into()).or_bug("too little scratch");
     let (items, rest) = split.unwrap_or_default();
     let most = most_fine(triangles.into());
     let room = split_mut::<FineSides>(rest, most).or_bug("too little scratch");
@@ -115,8 +113,7 @@ pub(super) fn build_in(
     // Make the nodes.
     watch.at(TOP)?;
     let bounds = Lattice::pad(&bounds);
-    let unit = inverse_power(bounds.size().max_element());
-    let work = HighInputs { least: least_node(&bounds), unit, tasks };
+    let work = HighInputs { least: least_node(&bounds), bounds, tasks };
     let (ids, nodes) = cut_index(&mut index, finite as u32);
     let (nodes, levels) = work.make(items, ids, nodes, &mut fine, control, watch)?;
 
@@ -125,26 +122,19 @@ pub(super) fn build_in(
     finish(mesh, Quality::High, bounds, index, finite as u32, contents)
 }
 
-/// A power of two near the inverse of a length.
-const fn inverse_power(length: f32) -> f32 {
-    let exponent = length.to_bits() >> 23 & 0xff;
-    let inverse = if exponent > 252 { 1 } else { 253 - exponent };
-    f32::from_bits(if inverse < 1 { 1 } else { inverse } << 23)
-}
-
 /// A task of the first pass: some triangles, and room for their items.
 struct ItemsTask<'w> {
     mesh: &'w TriangleMesh<'w>,
     flags: BuildFlags,
     first: u32,
-    items: &'w mut [TriangleItem],
+    items: &'w mut [Item],
 }
 
 /// Writes the items of all triangles that are finite, and returns how many there are and the box around them.
 fn boxes(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
-    items: &mut [TriangleItem],
+    items: &mut [Item],
     tasks: u32,
     control: &Control<'_>,
 ) -> Result<(usize, Aabb), Error> {
@@ -198,11 +188,8 @@ impl Kernel for ItemsTask<'_> {
                 left = left.wrapping_sub(1);
                 let Some(box_of) = finite_box(triangle, corners, flags)? else { continue };
                 bounds = bounds.union(&box_of);
-                // Turn -0 into 0, so that the order of a union does not matter.
-                let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
-                let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
-                if let Some(item) = items.get_mut(count).or_bug("more triangles than items") {
-                    *item = [x, y, z, triangle, nx, ny, nz, 0];
+                if let Some(slot) = items.get_mut(count).or_bug("more triangles than items") {
+                    *slot = item(&box_of, triangle, 1);
                 }
                 count += 1;
             }
@@ -214,8 +201,9 @@ impl Kernel for ItemsTask<'_> {
 
 /// The inputs that the steps after the first pass share.
 struct HighInputs {
+    /// The box around all triangles.
+    bounds: Aabb,
     least: f32,
-    unit: f32,
     tasks: u32,
 }
 
@@ -230,7 +218,7 @@ struct RangesTask<'w> {
     ranges: u32,
     /// The number of its first item among all.
     start: u32,
-    items: &'w mut [TriangleItem],
+    items: &'w mut [Item],
     ids: &'w mut [u32],
     /// Place of its first id in the index.
     first: u32,
@@ -268,16 +256,17 @@ impl Ranges {
 impl RangesTask<'_> {
     /// Makes the nodes over its ranges into `nodes`, which lie in the index from `child` on, and leaves a record
     /// in the place of each range; returns how many nodes are below their roots.
-    fn make(self, nodes: &mut [Node], child: u32) -> u32 {
-        let Self { work, mut cursor, top, ranges, start, items, ids, first } = self;
-        let level = SimdLevel::detect();
+    fn make(&mut self, nodes: &mut [Node], child: u32) -> u32 {
+        let Self { work, cursor, top, ranges, start, items, ids, first } = self;
+        let (start, first) = (*start, *first);
         let (mut node_count, mut id_count) = (0, 0);
-        for _ in 0..ranges {
+        for _ in 0..*ranges {
             let Some(waiter) = cursor.next(top).or_bug("a range is missing") else { break };
             let range = (waiter.start - start) as usize..(waiter.end - start) as usize;
             let Some(items) = items.get_mut(range).or_bug("a range too long") else { break };
             // Too little room for nodes and ids is legal: they are counted.
             let grow = Grow {
+                bounds: &work.bounds,
                 items,
                 level: waiter.level,
                 wait: 0,
@@ -286,10 +275,9 @@ impl RangesTask<'_> {
                 child: child + node_count,
                 ids: ids.get_mut(id_count as usize..).unwrap_or_default(),
                 first: first + id_count,
-                unit: work.unit,
                 least: work.least,
             };
-            let Grown { root, nodes, ids, levels } = dispatch(level, grow);
+            let Grown { root, nodes, ids, levels } = grow.run();
             node_count += nodes;
             id_count += ids;
             if let Some(place) = items.first_chunk_mut::<RECORD>().or_bug("a range too short") {
@@ -304,7 +292,7 @@ impl HighInputs {
     /// Makes all nodes and ids; returns how many nodes and levels there are.
     fn make(
         &self,
-        items: &mut [TriangleItem],
+        items: &mut [Item],
         ids: &mut [u32],
         nodes: &mut [Node],
         fine: &mut FineList<'_>,
@@ -320,6 +308,7 @@ impl HighInputs {
             return Ok((1, 1));
         }
         let grow = Grow {
+            bounds: &self.bounds,
             items,
             level: 0,
             wait: most_of_range(all as usize),
@@ -328,11 +317,9 @@ impl HighInputs {
             child: 1,
             ids,
             first: 0,
-            unit: self.unit,
             least: self.least,
         };
-        let level = SimdLevel::detect();
-        let Grown { root, nodes: below, ids: top_ids, levels } = dispatch(level, grow);
+        let Grown { root, nodes: below, ids: top_ids, levels } = grow.run();
         // Empty `nodes` and `ids` are legal, here and below: they are only counted then.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
@@ -348,7 +335,7 @@ impl HighInputs {
     /// had, and where their nodes lie. `ids` follow the first `top_ids`.
     fn below(
         &self,
-        items: &mut [TriangleItem],
+        items: &mut [Item],
         mut ids: &mut [u32],
         nodes: &mut [Node],
         [top_count, top_ids]: [u32; 2],
@@ -381,7 +368,7 @@ impl HighInputs {
             let mut made = 0;
             plans[0].child = top_count;
             for step in 0..STEPS {
-                let (part, ranges) = next(share(all, step, STEPS).end as u32);
+                let (mut part, ranges) = next(share(all, step, STEPS).end as u32);
                 let nodes = rest.get_mut(made as usize..).unwrap_or_default();
                 plans[0].ranges += ranges.count;
                 made += part.make(nodes, top_count + made);
@@ -397,7 +384,7 @@ impl HighInputs {
                 child += ranges.nodes;
                 (part, nodes, plan.child)
             });
-            let make = |(part, nodes, child): (RangesTask<'_>, _, _)| part.make(nodes, child);
+            let make = |(mut part, nodes, child): (RangesTask<'_>, _, _)| part.make(nodes, child);
             run(control, parts, make, |_| Ok(()))?;
         }
         Ok(plans)
@@ -407,7 +394,7 @@ impl HighInputs {
 /// Moves the nodes of all tasks together, and the root of each range to where it waits; returns how many nodes and
 /// levels there are. So far they are those of the top.
 fn gather(
-    items: &[TriangleItem],
+    items: &[Item],
     nodes: &mut [Node],
     plans: &[TaskRanges],
     [top_count, mut levels]: [u32; 2],

@@ -1,10 +1,10 @@
-//! Cuts a range of triangles in two where the SAH cost is least (Wald 2007).
+//! Cuts items in two where the SAH cost is least (Wald 2007).
 //!
 //! ```text
-//! for each triangle:  grow the box of the centres, which the bins divide
-//! for each triangle:  bin of its centre on each axis; grow the bins' boxes, count
-//! for each axis:      sweep from both ends; cost of a cut = area * count, summed over both sides
-//! for each triangle:  move it to the first part or the second
+//! for each item:  grow the box of the centres, which the bins divide
+//! for each item:  bin of its centre on each axis; grow the bins' boxes, add its cost
+//! for each axis:  sweep from both ends; cost of a cut = area * cost of the items, summed over both sides
+//! for each item:  move it to the first part or the second
 //! ```
 //!
 //! A box is one vector: least x, y, z and minus greatest x, y, z. So the union of two boxes is one minimum,
@@ -14,29 +14,49 @@ use core::mem::offset_of;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x8};
+use glam::Vec3A;
 use zerocopy::FromZeros;
 
-use crate::bvh::node::Sides;
+use crate::aabb::Aabb;
+use crate::bvh::node::{Sides, corners};
 use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 use crate::invariant::OrBug;
-use crate::simd::{HAS_VECTORS, inline_unless_small};
+use crate::simd::{HAS_VECTORS, Kernel};
 
-/// A triangle during a build, as bits: the least corner of its box, its id, the negated greatest corner, 0.
-pub(super) type TriangleItem = [u32; 8];
+/// A box during a build, as bits: the least corner, a number of the caller's, the negated greatest corner, the cost of
+/// entering it.
+pub(crate) type Item = [u32; 8];
 
-/// Index of the id in an item.
-pub(super) const ID: usize = 3;
+/// Index of the number in an item.
+pub(crate) const ID: usize = 3;
+
+/// Index of the cost in an item.
+const COST: usize = 7;
+
+/// Makes an item.
+#[inline(always)]
+pub(crate) fn item(bounds: &Aabb, id: u32, cost: u32) -> Item {
+    // Turn -0 into 0, so that the order of a union does not matter.
+    let [x, y, z] = (bounds.min + Vec3A::ZERO).to_array().map(f32::to_bits);
+    let [nx, ny, nz] = (-(bounds.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
+    [x, y, z, id, nx, ny, nz, cost]
+}
+
+/// The box of an item.
+pub(crate) fn box_of(item: &Item) -> Aabb {
+    corners(&item.map(f32::from_bits))
+}
 
 /// The box of nothing.
-pub(super) const NOTHING: Sides = [f32::INFINITY; 8];
+const NOTHING: Sides = [f32::INFINITY; 8];
 
 /// Bins of an axis, at most.
 const MOST_BINS: usize = 32;
 
 const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
 
-/// The triangles of a bin: their number, and the box around their boxes.
+/// The items of a bin: the sum of their costs, and the box around their boxes.
 ///
 /// A bin has a cache line of its own, so that no box lies across two. The box is off the multiples of 16 bytes, where
 /// the loads of items begin: some processors (Zen 4) let the load of an item wait for a store to a box if their
@@ -44,7 +64,7 @@ const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
 #[repr(C, align(64))]
 #[derive(Debug, Clone, Copy, FromZeros)]
 struct Bin {
-    count: u32,
+    cost: u32,
     /// Moves the box off the multiples of 16 bytes.
     _off: u32,
     bounds: Sides,
@@ -54,11 +74,11 @@ const _: () = assert!(size_of::<Bin>() == 64 && offset_of!(Bin, bounds) % 16 == 
 
 /// The bins of a range on each axis.
 #[derive(FromZeros)]
-pub(super) struct Bins([[Bin; MOST_BINS]; 3]);
+pub(crate) struct Bins([[Bin; MOST_BINS]; 3]);
 
-/// The box of an item, without its id: that may be a denormal number, and those are slow.
+/// The box of an item without the rest, which as numbers would be denormal, and those are slow.
 #[inline(always)]
-fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
+fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
     let word = u32::MAX;
     let mask = u32x8::simd_from(simd, [word, word, word, 0, word, word, word, 0]);
     (u32x8::simd_from(simd, *item) & mask).bitcast()
@@ -71,20 +91,9 @@ fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     sides - high.combine(low)
 }
 
-inline_unless_small! {
-    /// The box of some triangles.
-    pub(super) fn box_of<S: Simd>(simd: S, items: &[TriangleItem]) -> Sides {
-        let mut bounds = f32x8::splat(simd, f32::INFINITY);
-        for item in items {
-            bounds = bounds.lesser(load(simd, item));
-        }
-        bounds.into()
-    }
-}
-
-/// The box of twice the centres of some triangles.
+/// The box of twice the centres of some items.
 #[inline(always)]
-fn box_of_centers<S: Simd>(simd: S, items: &[TriangleItem]) -> Sides {
+fn box_of_centers<S: Simd>(simd: S, items: &[Item]) -> f32x8<S> {
     let mut centers = f32x8::splat(simd, f32::INFINITY);
     // Unite four centres first: a minimum with the box waits for the one before it.
     let (fours, rest) = if HAS_VECTORS { items.as_chunks::<4>() } else { (&[][..], items) };
@@ -96,55 +105,51 @@ fn box_of_centers<S: Simd>(simd: S, items: &[TriangleItem]) -> Sides {
     for item in rest {
         centers = centers.lesser(center(load(simd, item)));
     }
-    centers.into()
+    centers
 }
 
-/// Half the surface of a box whose lengths are multiplied by `scale`.
+/// Half the surface of a box whose lengths are multiplied by `unit`.
 #[inline(always)]
-pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, scale: f32) -> f32 {
+fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
     let (low, high) = sides.split();
-    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, scale)).into();
+    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, unit)).into();
     size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
 }
 
-/// The cost of so many triangles.
+/// A cost as a factor.
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "a cost")]
-const fn as_cost(count: u32) -> f32 {
-    count as f32
+const fn as_factor(cost: u32) -> f32 {
+    cost as f32
 }
 
 /// The map from centres to bins.
 struct BinScale {
     /// The least corner of the box of twice the centres.
-    low: [f32; 3],
+    low: [f32; 4],
     /// Bins for each unit of length; `f32::MAX` where all centres have the same coordinate.
-    scale: [f32; 3],
+    scale: [f32; 4],
     /// Bins of each axis.
     count: usize,
 }
 
 impl BinScale {
     #[inline(always)]
-    fn new(items: usize, centers: &Sides) -> Self {
-        let count = bin_count(items);
-        let [x, y, z, _, nx, ny, nz, _] = *centers;
+    fn new<S: Simd>(simd: S, count: usize, centers: f32x8<S>) -> Self {
         // Keep every place below the number of bins, in spite of rounding.
         #[expect(clippy::cast_precision_loss, reason = "a few")]
-        let bins = count as f32 * 0.999;
-        let extents = [0.0 - (x + nx), 0.0 - (y + ny), 0.0 - (z + nz)];
-        let [a, b, c] = extents.map(|extent| bins / extent);
-        let scale = [a.min(f32::MAX), b.min(f32::MAX), c.min(f32::MAX)];
-        Self { low: [x, y, z], scale, count }
+        let bins = f32x4::splat(simd, count as f32 * 0.999);
+        let (low, high) = centers.split();
+        let scale = bins / (f32x4::splat(simd, 0.0) - (low + high));
+        let scale = scale.lesser(f32x4::splat(simd, f32::MAX));
+        Self { low: low.into(), scale: scale.into(), count }
     }
 
     /// The bins of an item on each axis.
     #[inline(always)]
     fn bins_of<S: Simd>(&self, simd: S, sides: f32x8<S>) -> [usize; 3] {
-        let ([x, y, z], [a, b, c]) = (self.low, self.scale);
         let (min, max) = sides.split();
-        let low = f32x4::simd_from(simd, [x, y, z, 0.0]);
-        let scale = f32x4::simd_from(simd, [a, b, c, 0.0]);
+        let (low, scale) = (f32x4::simd_from(simd, self.low), f32x4::simd_from(simd, self.scale));
         let places = ((min - max) - low) * scale - f32x4::splat(simd, 0.5);
         let [x, y, z, _]: [f32; 4] = (places + f32x4::splat(simd, WHOLE_SHIFT)).into();
         [bin(x), bin(y), bin(z)]
@@ -152,7 +157,7 @@ impl BinScale {
 
     /// The bin of an item on one axis.
     #[inline(always)]
-    fn bin_of(&self, item: &TriangleItem, axis: usize) -> usize {
+    fn bin_of(&self, item: &Item, axis: usize) -> usize {
         let twice = f32::from_bits(item[axis % 3]) - f32::from_bits(item[4 + axis % 3]);
         let place = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
         bin(place + WHOLE_SHIFT)
@@ -197,36 +202,16 @@ impl Split {
 impl Bins {
     /// Bins of zeros: the compiler clears them where they lie, without a copy. [`fill`](Self::fill) sets a bin before
     /// it is read.
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::new_zeroed()
-    }
-
-    /// Cuts some items in two and returns how many are in the first part, and the boxes of both; `None` if no bins
-    /// tell them apart. Lengths are multiplied by `scale` before areas are computed.
-    #[inline(always)]
-    pub(super) fn cut<S: Simd>(
-        &mut self,
-        simd: S,
-        items: &mut [TriangleItem],
-        scale: f32,
-    ) -> Option<(usize, [Sides; 2])> {
-        let rule = BinScale::new(items.len(), &box_of_centers(simd, items));
-        self.fill(simd, items, &rule);
-        let split = self.best(simd, &rule, scale)?;
-        let bins = self.0[split.axis()].get(..rule.count).unwrap_or_default();
-        let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
-        let (first, second) = parts.unwrap_or_default();
-        let boxes = [union(simd, first), union(simd, second)];
-        let middle = partition(simd, items, &rule, &split);
-        (middle > 0 && middle < items.len()).then_some((middle, boxes))
     }
 
     /// Empties the bins, then adds each item to one bin of each axis.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, items: &[TriangleItem], rule: &BinScale) {
+    fn fill<S: Simd>(&mut self, simd: S, items: &[Item], rule: &BinScale) {
         for bins in &mut self.0 {
             for bin in bins.iter_mut().take(rule.count) {
-                (bin.bounds, bin.count) = (NOTHING, 0);
+                (bin.bounds, bin.cost) = (NOTHING, 0);
             }
         }
         for item in items {
@@ -235,14 +220,14 @@ impl Bins {
             for (axis, at) in [(0, x), (1, y), (2, z)] {
                 let bin = &mut self.0[axis][at % MOST_BINS];
                 bin.bounds = f32x8::simd_from(simd, bin.bounds).lesser(sides).into();
-                bin.count += 1;
+                bin.cost += item[COST];
             }
         }
     }
 
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
-    fn best<S: Simd>(&self, simd: S, rule: &BinScale, scale: f32) -> Option<Split> {
+    fn best<S: Simd>(&self, simd: S, rule: &BinScale, unit: f32) -> Option<Split> {
         debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
         let mut best = Split::NONE;
         for (axis, bins) in self.0.iter().enumerate() {
@@ -254,21 +239,52 @@ impl Bins {
             let mut costs = [f32::NAN; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             for (bin, cost) in bins.iter().take(rule.count).zip(&mut costs) {
-                *cost = area(simd, all, scale) * as_cost(sum);
+                *cost = area(simd, all, unit) * as_factor(sum);
                 all = all.lesser(f32x8::simd_from(simd, bin.bounds));
-                sum += bin.count;
+                sum += bin.cost;
             }
             // Add those of what is behind.
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             for at in (1..rule.count).rev() {
                 let (Some(bin), Some(before)) = (bins.get(at), costs.get(at)) else { continue };
                 all = all.lesser(f32x8::simd_from(simd, bin.bounds));
-                sum += bin.count;
-                let cost = before + area(simd, all, scale) * as_cost(sum);
+                sum += bin.cost;
+                let cost = before + area(simd, all, unit) * as_factor(sum);
                 best = best.min(Split::new(axis, at, cost));
             }
         }
         (best < Split::NONE).then_some(best)
+    }
+}
+
+/// Cuts items in two; returns how many are in the first part, and the boxes of both parts. `None` if no bins tell the
+/// items apart.
+pub(crate) struct Cut<'w> {
+    pub(crate) items: &'w mut [Item],
+    /// Bins of an axis, at most.
+    pub(crate) most_bins: usize,
+    /// The factor that scales lengths before areas are computed from them.
+    pub(crate) unit: f32,
+    /// Bins that other cuts may have used.
+    pub(crate) bins: &'w mut Bins,
+}
+
+impl Kernel for Cut<'_> {
+    type Output = Option<(usize, [Sides; 2])>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { items, most_bins, unit, bins } = self;
+        let count = bin_count(items.len()).min(most_bins);
+        let rule = BinScale::new(simd, count, box_of_centers(simd, items));
+        bins.fill(simd, items, &rule);
+        let split = bins.best(simd, &rule, unit)?;
+        let bins = bins.0[split.axis()].get(..rule.count).unwrap_or_default();
+        let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
+        let (first, second) = parts.unwrap_or_default();
+        let boxes = [union(simd, first), union(simd, second)];
+        let middle = partition(simd, items, &rule, &split);
+        (middle > 0 && middle < items.len()).then_some((middle, boxes))
     }
 }
 
@@ -279,12 +295,7 @@ impl Bins {
 /// to which an item belongs, as that is unpredictable. A choice between two items would become a masked store where the
 /// compiler may use AVX-512, and the next loads would wait for it.
 #[inline(always)]
-fn partition<S: Simd>(
-    simd: S,
-    items: &mut [TriangleItem],
-    rule: &BinScale,
-    split: &Split,
-) -> usize {
+fn partition<S: Simd>(simd: S, items: &mut [Item], rule: &BinScale, split: &Split) -> usize {
     let Some(&start) = items.first() else { return 0 };
     let mut middle = 0;
     for gap in 0..items.len() {
@@ -303,7 +314,7 @@ fn partition<S: Simd>(
 
 /// Stores an item.
 #[inline(always)]
-fn put<S: Simd>(items: &mut [TriangleItem], at: usize, item: u32x8<S>) {
+fn put<S: Simd>(items: &mut [Item], at: usize, item: u32x8<S>) {
     if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
         *slot = item.into();
     }
@@ -339,7 +350,7 @@ mod tests {
     use crate::simd::{Kernel, SimdLevel, dispatch};
 
     /// Finds the box of twice the centres of some items, then cuts them, with bins that earlier cuts have used.
-    struct CutOf<'a>(&'a mut [TriangleItem], &'a mut Bins);
+    struct CutOf<'a>(&'a mut [Item], &'a mut Bins);
 
     impl Kernel for CutOf<'_> {
         type Output = (Sides, Option<(usize, [Sides; 2])>);
@@ -347,25 +358,25 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(items, bins) = self;
-            (box_of_centers(simd, items), bins.cut(simd, items, UNIT))
+            let centers = box_of_centers(simd, items).into();
+            (centers, Cut { items, most_bins: MOST_BINS, unit: UNIT, bins }.run(simd))
         }
     }
 
     const UNIT: f32 = 0.125;
 
-    fn sides_of_item(item: &TriangleItem) -> Sides {
+    fn sides_of_item(item: &Item) -> Sides {
         let [x, y, z, _, u, v, w, _] = item.map(f32::from_bits);
         [x, y, z, 0.0, u, v, w, 0.0]
     }
 
     /// The box of some items, and the cost of entering them.
-    fn box_and_cost(items: &[TriangleItem]) -> (Sides, f32) {
+    fn box_and_cost(items: &[Item]) -> (Sides, f32) {
         let bounds = least(items.iter().map(sides_of_item));
         let size = |axis: usize| (bounds[axis] + bounds[axis + 4]) * UNIT;
         let (x, y, z) = (size(0), size(1), size(2));
-        #[expect(clippy::cast_precision_loss, reason = "small")]
-        let count = items.len() as f32;
-        (bounds, (x * y + y * z + z * x) * count)
+        let cost: u32 = items.iter().map(|item| item[COST]).sum();
+        (bounds, (x * y + y * z + z * x) * as_factor(cost))
     }
 
     /// The least number in each lane.
@@ -374,7 +385,7 @@ mod tests {
     }
 
     /// The box of twice the centres of some items.
-    fn naive_box_of_centers(items: &[TriangleItem]) -> Sides {
+    fn naive_box_of_centers(items: &[Item]) -> Sides {
         least(
             items.iter().map(sides_of_item).map(|[x, y, z, _, u, v, w, _]| {
                 [x - u, y - v, z - w, 0.0, u - x, v - y, w - z, 0.0]
@@ -382,14 +393,23 @@ mod tests {
         )
     }
 
+    /// The map from centres to bins.
+    fn naive_rule(items: &[Item]) -> BinScale {
+        let (count, centers) = (bin_count(items.len()), naive_box_of_centers(items));
+        #[expect(clippy::cast_precision_loss, reason = "a few")]
+        let scale = |axis: usize| count as f32 * 0.999 / -(centers[axis] + centers[axis + 4]);
+        let scale = array::from_fn(|axis| scale(axis).abs().min(f32::MAX));
+        BinScale { low: array::from_fn(|axis| centers[axis]), scale, count }
+    }
+
     /// Makes the same cut, found by trying each; of equal ones that of the first axis, then of the last bin. Leaves
     /// both parts in the order of their ids.
-    fn naive(items: &mut [TriangleItem]) -> Option<(usize, [Sides; 2])> {
-        let rule = BinScale::new(items.len(), &naive_box_of_centers(items));
+    fn naive(items: &mut [Item]) -> Option<(usize, [Sides; 2])> {
+        let rule = naive_rule(items);
         let mut best = (f32::INFINITY, 0, 0);
         for axis in (0..3).filter(|&axis| rule.scale[axis] < f32::MAX) {
             for bin in (1..rule.count).rev() {
-                let is_first = |item: &&TriangleItem| rule.bin_of(item, axis) < bin;
+                let is_first = |item: &&Item| rule.bin_of(item, axis) < bin;
                 let (first, second): (Vec<_>, Vec<_>) = items.iter().partition(is_first);
                 if first.is_empty() || second.is_empty() {
                     continue;
@@ -404,7 +424,7 @@ mod tests {
         if cost.is_infinite() {
             return None;
         }
-        let is_first = |item: &TriangleItem| rule.bin_of(item, axis) < bin;
+        let is_first = |item: &Item| rule.bin_of(item, axis) < bin;
         let middle = items.iter().filter(|item| is_first(item)).count();
         items.sort_by_key(|item| (!is_first(item), item[ID]));
         Some((middle, [box_and_cost(&items[..middle]).0, box_and_cost(&items[middle..]).0]))
@@ -423,13 +443,11 @@ mod tests {
                     let number = (random::point(&mut state).x * steps).floor() / steps;
                     if axis < flat { number } else { 0.5 }
                 };
-                let items: Vec<TriangleItem> = (0..count)
+                let items: Vec<Item> = (0..count)
                     .map(|id| {
-                        let low = [number(0), number(1), number(2)];
-                        let size = [number(0), number(1), number(2)].map(f32::abs);
-                        let [x, y, z] = low.map(f32::to_bits);
-                        let [u, v, w] = [0, 1, 2].map(|axis| (-(low[axis] + size[axis])).to_bits());
-                        [x, y, z, id, u, v, w, 0]
+                        let min = Vec3A::new(number(0), number(1), number(2));
+                        let size = Vec3A::new(number(0), number(1), number(2)).abs();
+                        item(&Aabb { min, max: min + size }, id, 1 + id % 3)
                     })
                     .collect();
                 let centers = naive_box_of_centers(&items);
@@ -437,7 +455,7 @@ mod tests {
                 let found = naive(&mut expected);
                 assert_eq!(found.is_none(), flat == 0, "{count}, {steps}, {flat}");
                 let middle = found.map_or(count as usize, |(middle, _)| middle);
-                let mut order: Option<Vec<TriangleItem>> = None;
+                let mut order: Option<Vec<Item>> = None;
                 for level in SimdLevel::available() {
                     let mut items = items.clone();
                     let (centers_of, cut) = dispatch(level, CutOf(&mut items, &mut bins));
