@@ -509,7 +509,7 @@ impl BuildInputs<'_> {
                 let (min, max) = (Vec3A::from_array(record.min), Vec3A::from_array(record.max));
                 *slot = item(&Aabb { min, max }, at, record.count.div_ceil(4));
             }
-            top::build(items, &self.bounds, record, nodes, all.nodes, self.least, &mut fine)
+            top::build(items, &self.bounds, record, nodes, all.nodes, &mut fine)
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
         let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;

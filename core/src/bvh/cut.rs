@@ -52,7 +52,7 @@ pub(crate) fn box_of(item: &Item) -> Aabb {
 const NOTHING: Sides = [f32::INFINITY; 8];
 
 /// Bins of an axis, at most.
-const MOST_BINS: usize = 32;
+pub(crate) const MOST_BINS: usize = 32;
 
 const _: () = assert!(MOST_BINS <= 0xff, "a split has eight bits for a bin");
 
@@ -76,7 +76,7 @@ const _: () = assert!(size_of::<Bin>() == 64 && offset_of!(Bin, bounds) % 16 == 
 #[derive(FromZeros)]
 pub(crate) struct Bins([[Bin; MOST_BINS]; 3]);
 
-/// The box of an item without the rest, which as numbers would be denormal, and those are slow.
+/// The box of an item without the rest, which may be denormal numbers, and those are slow.
 #[inline(always)]
 fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
     let word = u32::MAX;
@@ -259,7 +259,7 @@ impl Bins {
 
 /// Cuts items in two; returns how many are in the first part, and the boxes of both parts. `None` if no bins tell the
 /// items apart.
-pub(crate) struct Cut<'w> {
+pub(crate) struct CutInTwo<'w> {
     pub(crate) items: &'w mut [Item],
     /// Bins of an axis, at most.
     pub(crate) most_bins: usize,
@@ -269,7 +269,7 @@ pub(crate) struct Cut<'w> {
     pub(crate) bins: &'w mut Bins,
 }
 
-impl Kernel for Cut<'_> {
+impl Kernel for CutInTwo<'_> {
     type Output = Option<(usize, [Sides; 2])>;
 
     #[inline(always)]
@@ -284,7 +284,8 @@ impl Kernel for Cut<'_> {
         let (first, second) = parts.unwrap_or_default();
         let boxes = [union(simd, first), union(simd, second)];
         let middle = partition(simd, items, &rule, &split);
-        (middle > 0 && middle < items.len()).then_some((middle, boxes))
+        debug_assert!(middle > 0 && middle < items.len(), "a part without items");
+        Some((middle, boxes))
     }
 }
 
@@ -347,7 +348,7 @@ mod tests {
 
     use super::*;
     use crate::random;
-    use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::simd::{SimdLevel, dispatch};
 
     /// Finds the box of twice the centres of some items, then cuts them, with bins that earlier cuts have used.
     struct CutOf<'a>(&'a mut [Item], &'a mut Bins);
@@ -359,7 +360,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(items, bins) = self;
             let centers = box_of_centers(simd, items).into();
-            (centers, Cut { items, most_bins: MOST_BINS, unit: UNIT, bins }.run(simd))
+            (centers, CutInTwo { items, most_bins: MOST_BINS, unit: UNIT, bins }.run(simd))
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! parts = [range]
-//! until there are eight: choose the part that costs most to enter; cut it in two (cut.rs)
+//! until there are eight: choose the part with the largest surface, leaves last; cut it in two (cut.rs)
 //! ```
 //!
 //! An item is a triangle in a tree of quality `high`, the root of a subtree in one of quality `fast`.
@@ -10,12 +10,12 @@
 use core::ops::Range;
 
 use crate::aabb::Aabb;
-use crate::bvh::cut::{Bins, Cut, Item, box_of};
+use crate::bvh::cut::{Bins, CutInTwo, Item, box_of};
 use crate::bvh::node::{WIDTH, corners};
 use crate::invariant::OrBug;
 use crate::simd::{SimdLevel, dispatch};
 
-/// The sizes that end the cutting.
+/// How ranges are cut.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     /// A part of more items becomes a node.
@@ -24,10 +24,11 @@ pub(crate) struct Limits {
     pub(crate) small: u32,
     /// Bins of an axis, at most.
     pub(crate) bins: usize,
+    /// The level from which on each cut is in the middle, so that the number of levels is bounded.
+    pub(crate) halved_from: u32,
 }
 
 /// The parts of a range, which become the children of a node.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct Parts {
     count: usize,
     /// Part `p` holds the items from `ends[p]` to `ends[p + 1]`.
@@ -90,9 +91,10 @@ impl Cutter {
         Self { limits, level: SimdLevel::detect(), unit, bins: Bins::new() }
     }
 
-    /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer. With `halve`,
-    /// each cut is in the middle.
-    pub(crate) fn parts(&mut self, items: &mut [Item], range: &Range<u32>, halve: bool) -> Parts {
+    /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer. They become
+    /// the children of a node with `level` levels above.
+    pub(crate) fn parts(&mut self, items: &mut [Item], range: &Range<u32>, level: u32) -> Parts {
+        let halve = level >= self.limits.halved_from;
         let mut parts = Parts::one(range);
         while parts.count < WIDTH
             && let Some((part, range)) = self.choose(&parts, halve)
@@ -103,9 +105,9 @@ impl Cutter {
             parts.replace(part, range.start + count, boxes, self.unit);
         }
         if parts.count == 1 {
-            // Only a root of few triangles is not cut. Find its box here.
-            let all = items.get(range.start as usize..range.end as usize).unwrap_or_default();
-            parts.boxes[0] = box_around(all);
+            // Only a range that is small from the start is not cut: that of a root over few triangles.
+            let all = items.get(range.start as usize..range.end as usize);
+            parts.boxes[0] = box_around(all.or_bug("a range behind the items").unwrap_or_default());
         }
         parts
     }
@@ -118,7 +120,7 @@ impl Cutter {
         if !halve && items.len() > 2 {
             let bins = &mut self.bins;
             let cut =
-                Cut { items: &mut *items, most_bins: self.limits.bins, unit: self.unit, bins };
+                CutInTwo { items: &mut *items, most_bins: self.limits.bins, unit: self.unit, bins };
             if let Some((middle, boxes)) = dispatch(self.level, cut) {
                 return (middle as u32, boxes.map(|sides| corners(&sides)));
             }
@@ -143,7 +145,7 @@ impl Cutter {
             let is_node = count > self.limits.leaf;
             #[expect(clippy::cast_precision_loss, reason = "a priority")]
             let priority = match (halve, is_node) {
-                (true, _) => count as f32,
+                (true, _) => 0.0,
                 (false, true) => area,
                 (false, false) => area * count as f32,
             };
@@ -183,8 +185,9 @@ mod tests {
         let mut state = 1;
         let everywhere = Aabb { min: Vec3A::splat(-1.0), max: Vec3A::splat(2.0) };
         for (leaf, small) in [(8, 4), (1, 1)] {
-            let mut cutter = Cutter::new(&everywhere, Limits { leaf, small, bins: 16 });
-            for (count, halve) in (1..100).flat_map(|count| [(count, false), (count, true)]) {
+            let mut cutter =
+                Cutter::new(&everywhere, Limits { leaf, small, bins: 16, halved_from: 1 });
+            for (count, level) in (1..100).flat_map(|count| [(count, 0), (count, 1)]) {
                 // In every third range all items have the same box, so that no bins tell them apart.
                 let mut point =
                     || if count % 3 == 0 { Vec3A::ONE } else { random::point(&mut state) };
@@ -194,7 +197,7 @@ mod tests {
                     .map(|(id, min)| item(&Aabb { min, max: min + 0.1 }, id, 1))
                     .collect();
                 let mut items = before.clone();
-                let parts = cutter.parts(&mut items, &range, halve);
+                let parts = cutter.parts(&mut items, &range, level);
                 let mut end = range.start;
                 for (part, bounds) in parts.ranges().zip(&parts.boxes) {
                     assert!(part.start == end && part.end > end, "{count}");
@@ -207,10 +210,36 @@ mod tests {
                 let least = parts.ranges().map(|part| part.end - part.start).min().unwrap();
                 let parts = parts.ranges().count();
                 assert!(parts == WIDTH || most <= small, "{count}");
+                assert_eq!(parts == 1, count <= small);
                 // Halves differ by one at most, and the largest is cut first.
-                assert!(!halve || most <= 2 * least + 1, "{count}");
+                assert!(level == 0 || most <= 2 * least + 1, "{count}");
                 items[range.start as usize..range.end as usize].sort_by_key(|item| item[ID]);
                 assert_eq!(items, before);
+            }
+        }
+    }
+
+    #[test]
+    fn nodes_are_cut_before_leaves_and_wide_parts_before_others() {
+        let limits = Limits { leaf: 8, small: 4, bins: 16, halved_from: 1 };
+        let cutter = Cutter::new(&Aabb { min: Vec3A::ZERO, max: Vec3A::ONE }, limits);
+        // Parts of so many items with such surfaces; the part that is cut next, and the one if parts are halved.
+        let cases = [
+            ([(8, 9.0), (9, 1.0), (3, 50.0), (5, 20.0)], [Some(1), Some(1)]),
+            ([(10, 9.0), (9, 1.0), (9, 10.0), (5, 20.0)], [Some(2), Some(0)]),
+            ([(8, 9.0), (8, 1.0), (3, 50.0), (5, 20.0)], [Some(3), Some(0)]),
+            ([(4, 9.0), (1, 1.0), (3, 50.0), (2, 20.0)], [None, None]),
+        ];
+        for (sizes, chosen) in cases {
+            let mut parts = Parts::one(&(0..0));
+            parts.count = sizes.len();
+            for (at, (count, area)) in sizes.into_iter().enumerate() {
+                parts.ends[at + 1] = parts.ends[at] + count;
+                parts.areas[at] = area;
+            }
+            for (halve, chosen) in [false, true].into_iter().zip(chosen) {
+                let expected = chosen.map(|at| (at, parts.ends[at]..parts.ends[at + 1]));
+                assert_eq!(cutter.choose(&parts, halve), expected);
             }
         }
     }

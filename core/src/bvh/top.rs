@@ -6,8 +6,6 @@
 //!                        (16 bins an axis at most, by centre; an item costs ceil(triangles / 4))
 //! parts of one root become that root's node, the others nodes of their own, breadth first
 //! ```
-//!
-//! At [`DEEP`] levels parts are halved instead, so that the number of levels is bounded.
 
 use crate::aabb::Aabb;
 use crate::invariant::OrBug;
@@ -15,17 +13,14 @@ use crate::invariant::OrBug;
 use super::cut::{ID, Item};
 use super::fine::FineList;
 use super::layout::Entry;
-use super::node::Node;
+use super::node::{Node, least_node};
 use super::parts::{Cutter, Limits};
 
 /// An item in entries.
 pub(crate) const ITEM: usize = size_of::<Item>() / size_of::<Entry>();
 
-/// Levels from which on parts are halved.
-const DEEP: u32 = 20;
-
 /// How ranges of roots are cut. More bins make rays no faster.
-const LIMITS: Limits = Limits { leaf: 1, small: 1, bins: 16 };
+const LIMITS: Limits = Limits { leaf: 1, small: 1, bins: 16, halved_from: 20 };
 
 /// The tree over the roots.
 #[derive(Debug, Clone, Copy)]
@@ -38,17 +33,16 @@ pub(crate) struct Top {
     pub(crate) levels: u32,
 }
 
-/// Makes the nodes over some items, the roots within `bounds`, and writes all but the topmost to `nodes`. `record`
+/// Makes the nodes over some items, the roots of a tree with this box, and writes all but the topmost to `nodes`. `record`
 /// returns the node of a subtree, which becomes a child, and its levels. Returns `None` if `nodes` is too short.
 ///
-/// `child` is where `nodes` will lie in the index; `least` is [`least_node`](super::node::least_node) of the tree.
+/// `child` is where `nodes` will lie in the index.
 pub(crate) fn build(
     items: &mut [Item],
     bounds: &Aabb,
     record: impl Fn(u32) -> (Node, u32),
     nodes: &mut [Node],
     child: u32,
-    least: f32,
     fine: &mut FineList<'_>,
 ) -> Option<Top> {
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
@@ -66,7 +60,7 @@ pub(crate) fn build(
             Some(_) => break,
         };
         let Some([start, end, level]) = node.waiter() else { continue };
-        let parts = cutter.parts(items, &(start..end), level >= DEEP);
+        let parts = cutter.parts(items, &(start..end), level);
         let mut node = Node { child: child + count, ..Node::EMPTY };
         for (slot, part) in parts.ranges().enumerate() {
             node.set_inner(slot);
@@ -81,7 +75,7 @@ pub(crate) fn build(
             *nodes.get_mut(count as usize)? = below;
             count += 1;
         }
-        node.set_boxes(&parts.bounds(), &parts.boxes, least);
+        node.set_boxes(&parts.bounds(), &parts.boxes, least_node(bounds));
         #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
         let number = at.map_or(0, |at| child + at as u32);
         fine.add(number, &mut node, &parts.boxes);
@@ -116,11 +110,11 @@ mod tests {
         // A root and its part of the nodes above are 11 / 7 nodes (the layout proves it).
         let mut nodes = vec![Node::EMPTY; boxes.len() * 11 / 7];
         let mut fine = FineList::new(&mut []);
-        let top = build(&mut items, &bounds, leaf, &mut nodes, 1000, 1e-6, &mut fine).unwrap();
+        let top = build(&mut items, &bounds, leaf, &mut nodes, 1000, &mut fine).unwrap();
         let Top { root, count, levels } = top;
         // One less is too few.
         let mut few = vec![Node::EMPTY; count as usize - 1];
-        assert!(build(&mut items, &bounds, leaf, &mut few, 1000, 1e-6, &mut fine).is_none());
+        assert!(build(&mut items, &bounds, leaf, &mut few, 1000, &mut fine).is_none());
         let mut met = Vec::new();
         let mut todo = vec![(root, 1)];
         while let Some((node, level)) = todo.pop() {
@@ -164,7 +158,7 @@ mod tests {
                 })
                 .collect();
             let levels = build_over(&nested);
-            assert!(levels <= DEEP + 9 + 1, "{levels}");
+            assert!(levels <= LIMITS.halved_from + 9 + 1, "{levels}");
         }
     }
 
@@ -175,11 +169,15 @@ mod tests {
     }
 
     #[test]
-    fn roots_without_a_surface_are_cut_in_halves() {
-        for scale in [1e-38_f32, 1e-20, 1e20, 1e36] {
+    fn lines_of_any_scale_take_few_levels() {
+        for scale in [1e-38_f32, 1e-20, 1.0, 1e20, 1e36] {
             let line: Vec<_> =
                 (0_u8..100).map(|i| cube(f32::from(i) / 100.0 * scale, 0.0)).collect();
             assert!(build_over(&line) <= 9, "{scale}");
+            // Boxes on an axis have no surface at all, so that all cuts cost the same.
+            let on_axis = line.iter().map(|point| point.min * Vec3A::X);
+            let on_axis: Vec<_> = on_axis.map(|at| Aabb { min: at, max: at }).collect();
+            assert!(build_over(&on_axis) <= 9, "{scale}");
         }
     }
 }

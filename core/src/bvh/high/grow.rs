@@ -12,28 +12,26 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::aabb::Aabb;
-use crate::bvh::cut::{ID, Item};
+use crate::bvh::cut::{ID, Item, MOST_BINS};
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
-use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH};
+use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH, least_node};
 use crate::bvh::parts::{Cutter, Limits};
 use crate::invariant::OrBug;
 
-/// The level from which on ranges are halved.
-const HALVED_FROM: u32 = 24;
+/// How ranges of triangles are cut.
+const LIMITS: Limits =
+    Limits { leaf: LEAF as u32, small: SMALL_LEAF as u32, bins: MOST_BINS, halved_from: 24 };
 
 /// Levels of nodes, at most. Where parts are halved, a level divides a range by eight, so ten levels reach the leaves
 /// from 2^31 triangles; one is to spare.
-pub(super) const MOST_LEVELS: u32 = HALVED_FROM + 11;
+pub(super) const MOST_LEVELS: u32 = LIMITS.halved_from + 11;
 
 const _: () = assert!(MOST_LEVELS <= LEVELS);
 
-/// How ranges of triangles are cut.
-const LIMITS: Limits = Limits { leaf: LEAF as u32, small: SMALL_LEAF as u32, bins: 32 };
-
 /// A range of triangles over which nodes are to be made.
 pub(super) struct Grow<'w, 'f> {
-    /// The box around all triangles of the tree.
+    /// The box of the tree.
     pub(super) bounds: &'w Aabb,
     /// The triangles, in any order that the mesh alone determines.
     pub(super) items: &'w mut [Item],
@@ -52,8 +50,6 @@ pub(super) struct Grow<'w, 'f> {
     pub(super) ids: &'w mut [u32],
     /// Place of the first of them in the index.
     pub(super) first: u32,
-    /// [`least_node`](crate::bvh::node::least_node) of the tree.
-    pub(super) least: f32,
 }
 
 /// The result of [`Grow`].
@@ -109,11 +105,12 @@ impl Siblings {
 }
 
 impl Grow<'_, '_> {
-    /// Makes the nodes. Out of line: the bins shall leave the stack before the next range comes.
+    /// Makes the nodes. Out of line, so that the bins of the top are off the stack when those below are made.
     #[inline(never)]
     pub(super) fn run(mut self) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
         let mut cutter = Cutter::new(self.bounds, LIMITS);
+        let least = least_node(self.bounds);
         // One entry a level: under the nodes of an entry are those of the next. The first entry holds the root alone.
         let mut stack = [Siblings::NONE; MOST_LEVELS as usize];
         #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
@@ -130,8 +127,7 @@ impl Grow<'_, '_> {
                 continue;
             };
             grown.levels = grown.levels.max(job.level + 1);
-            let halve = job.level >= HALVED_FROM;
-            let parts = cutter.parts(self.items, &(job.start..job.end), halve);
+            let parts = cutter.parts(self.items, &(job.start..job.end), job.level);
             let mut node = Node {
                 child: self.child + grown.nodes,
                 first: self.first + grown.ids,
@@ -173,7 +169,7 @@ impl Grow<'_, '_> {
                 depth += 1;
             }
             // Quantise the boxes, and write the node.
-            node.set_boxes(&parts.bounds(), &parts.boxes, self.least);
+            node.set_boxes(&parts.bounds(), &parts.boxes, least);
             self.add_fine_sides(&job, &mut node, &parts.boxes);
             match job.place.checked_sub(1) {
                 None => grown.root = node,

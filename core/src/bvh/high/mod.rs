@@ -32,7 +32,7 @@ use super::cut::{Item, item};
 use super::fine::{FineList, FineSides, most_fine};
 use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
 use super::layout::index_bytes;
-use super::node::{Node, least_node};
+use super::node::Node;
 use crate::aabb::Aabb;
 use crate::arena::{first_mut, move_down, section_bytes, split_mut};
 use crate::blob::Header;
@@ -113,7 +113,7 @@ pub(super) fn build_in(
     // Make the nodes.
     watch.at(TOP)?;
     let bounds = Lattice::pad(&bounds);
-    let work = HighInputs { least: least_node(&bounds), bounds, tasks };
+    let work = HighInputs { bounds, tasks };
     let (ids, nodes) = cut_index(&mut index, finite as u32);
     let (nodes, levels) = work.make(items, ids, nodes, &mut fine, control, watch)?;
 
@@ -201,9 +201,8 @@ impl Kernel for ItemsTask<'_> {
 
 /// The inputs that the steps after the first pass share.
 struct HighInputs {
-    /// The box around all triangles.
+    /// The box of the tree.
     bounds: Aabb,
-    least: f32,
     tasks: u32,
 }
 
@@ -255,7 +254,8 @@ impl Ranges {
 
 impl RangesTask<'_> {
     /// Makes the nodes over its ranges into `nodes`, which lie in the index from `child` on, and leaves a record
-    /// in the place of each range; returns how many nodes are below their roots.
+    /// in the place of each range; returns how many nodes are below their roots. By reference: a copy of the cursor
+    /// would take stack.
     fn make(&mut self, nodes: &mut [Node], child: u32) -> u32 {
         let Self { work, cursor, top, ranges, start, items, ids, first } = self;
         let (start, first) = (*start, *first);
@@ -275,7 +275,6 @@ impl RangesTask<'_> {
                 child: child + node_count,
                 ids: ids.get_mut(id_count as usize..).unwrap_or_default(),
                 first: first + id_count,
-                least: work.least,
             };
             let Grown { root, nodes, ids, levels } = grow.run();
             node_count += nodes;
@@ -317,7 +316,6 @@ impl HighInputs {
             child: 1,
             ids,
             first: 0,
-            least: self.least,
         };
         let Grown { root, nodes: below, ids: top_ids, levels } = grow.run();
         // Empty `nodes` and `ids` are legal, here and below: they are only counted then.
