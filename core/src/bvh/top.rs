@@ -33,8 +33,9 @@ pub(crate) struct Top {
     pub(crate) levels: u32,
 }
 
-/// Makes the nodes over some items, the roots of a tree with this box, and writes all but the topmost to `nodes`. `record`
-/// returns the node of a subtree, which becomes a child, and its levels. Returns `None` if `nodes` is too short.
+/// Makes the nodes over some items, the roots of a tree with this box, and writes all but the topmost to `nodes`.
+/// `record` returns the node of a subtree, which becomes a child, and its levels. Returns `None` if `nodes` is too
+/// short.
 ///
 /// `child` is where `nodes` will lie in the index.
 pub(crate) fn build(
