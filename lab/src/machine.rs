@@ -8,6 +8,9 @@ use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
+/// The environment variable by which a program's heap asks for large pages, which change times.
+const TUNABLES: &str = "GLIBC_TUNABLES";
+
 /// The machine, the compiler, the day and the command line of a measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
@@ -24,7 +27,7 @@ pub struct Machine {
     pub commit: Option<String>,
     /// The day, in UTC, as YYYY-MM-DD.
     pub date: String,
-    /// The command line, with only the file name of the program.
+    /// The command line, with only the file name of the program, behind the variable `GLIBC_TUNABLES` if it is set.
     pub command: String,
 }
 
@@ -44,7 +47,10 @@ impl Machine {
             rustc: rustc_version_runtime::version().to_string(),
             commit: commit(),
             date: now,
-            command: command(env::args_os().map(|word| word.to_string_lossy().into_owned())),
+            command: command(
+                env::var(TUNABLES).ok().as_deref(),
+                env::args_os().map(|word| word.to_string_lossy().into_owned()),
+            ),
         }
     }
 
@@ -101,16 +107,18 @@ fn cpu_name(text: &str) -> Option<String> {
     Some(format!("{name}, family {family}, model {model}"))
 }
 
-/// Returns the words of a command line, quoted for a shell where necessary.
-fn command(mut words: impl Iterator<Item = String>) -> String {
-    let program = words.next().unwrap_or_default();
-    let name = Path::new(&program).file_stem().unwrap_or_default().to_string_lossy();
-    let words = words.map(|word| {
+/// Returns the words of a command line, quoted for a shell where necessary, behind the value of [`TUNABLES`].
+fn command(tunables: Option<&str>, mut words: impl Iterator<Item = String>) -> String {
+    let quoted = |word: &str| {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
         let is_plain = !word.is_empty() && word.chars().all(is_plain);
-        if is_plain { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
-    });
-    core::iter::once(name.into_owned()).chain(words).collect::<Vec<_>>().join(" ")
+        if is_plain { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    };
+    let program = words.next().unwrap_or_default();
+    let name = Path::new(&program).file_stem().unwrap_or_default().to_string_lossy();
+    let setting = tunables.map(|value| format!("{TUNABLES}={}", quoted(value)));
+    let words = words.map(|word| quoted(&word));
+    setting.into_iter().chain([name.into_owned()]).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -149,7 +157,10 @@ mod tests {
     fn commands_can_be_pasted() {
         let words = ["/some/where/hgrid", "table", "my bunny.ply", "--view", "-3,4", "it's", ""];
         let expected = r"hgrid table 'my bunny.ply' --view -3,4 'it'\''s' ''";
-        assert_eq!(command(words.into_iter().map(str::to_owned)), expected);
-        assert_eq!(command(core::iter::empty()), "");
+        assert_eq!(command(None, words.into_iter().map(str::to_owned)), expected);
+        assert_eq!(command(None, core::iter::empty()), "");
+        let words = ["hgrid", "compare"].map(str::to_owned).into_iter();
+        let expected = "GLIBC_TUNABLES=glibc.malloc.hugetlb=1 hgrid compare";
+        assert_eq!(command(Some("glibc.malloc.hugetlb=1"), words), expected);
     }
 }

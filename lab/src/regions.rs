@@ -139,13 +139,13 @@ pub(crate) fn peak_bytes(
     Ok(regions.written_bytes(index_bytes))
 }
 
-/// The least number of bytes for which large pages are requested: eight pages of 2 MiB.
+/// The least number of bytes for which large pages are requested: one page of 2 MiB.
 #[cfg(target_os = "linux")]
-const MANY_BYTES: usize = 16 << 20;
+const MANY_BYTES: usize = 2 << 20;
 
 /// Maps memory whose pages the system provides when they are first written, large ones if it has them. They
-/// make a build of a million triangles faster, and Embree requests them, too. A small build would write
-/// little of each, and wait until the system has cleared all of it.
+/// make first builds of 150 000 triangles and more faster, and Embree requests them, too. A smaller build would
+/// write little of each, and wait until the system has cleared all of it.
 pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
     // A system without large pages provides small ones.
