@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Groups use the slab test of [`slab`](super::slab), rounded differently. Let u = 2^-24, and measure from the
-//! origin of the first ray that is not done. A distance is `side * inverse - origin * inverse`; the second product is
+//! origin of the first ray that was ready. A distance is `side * inverse - origin * inverse`; the second product is
 //! computed once a ray.
 //!
 //! ```text

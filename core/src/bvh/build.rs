@@ -16,15 +16,15 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items, fine sides) | spare |
 //! ```
 //!
-//! `spare` is the second buffer when a bin is sorted. While a crowded bin is divided, its centres lie in the index;
+//! `spare` is the second buffer when a unit is sorted. While a crowded bin is divided, its centres lie in the index;
 //! `spare` holds those that have no room there. `sizes` computes the exact size by a build without an index: it also
 //! puts the keys and the top tree into `spare`, and only counts ids and nodes; fine sides stay in `entries`. A build
 //! puts the keys there, too, if they do not fit into the index: an index of exact size has no room for keys of
 //! triangles that are skipped.
 //!
-//! Each step but the last is cut into tasks: the passes by triangles, the roots by units. The tree does not
-//! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
-//! side by side in the order of the bins.
+//! Each step but the last is cut into tasks: the passes by triangles, the roots by units. The tree does not depend on
+//! the number of tasks: a bin has its entries in the order of their ids, and subtrees end up side by side in the order
+//! of the units, those of crowded bins first.
 
 #![expect(
     clippy::cast_possible_truncation,

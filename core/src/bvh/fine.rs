@@ -2,9 +2,9 @@
 //!
 //! A step is a 127th to a 254th of a node. A child that is thinner (a wall, a floor, a small object in a large scene)
 //! gets a box that is one or two steps thick. Rays that start near the child then enter its box, and all that is below
-//! it, though they do not come close. So a node with such a child has a second set of sides. The root also has one, if
-//! the mesh has 2048 triangles or more: rays often start at the outer walls. A query may use either set: both hold all
-//! triangles.
+//! it, though they do not come close. So a node with such a child gets a second set of sides, as long as there is room
+//! for one in 2048 triangles. The root of the tree comes first, also without a thin child: rays often start at the
+//! outer walls. A query may use either set: both hold all triangles.
 //!
 //! Quality `fast` gives fine sides to nodes above the roots of subtrees, nearest to the root of the tree first; quality
 //! `high` to nodes above the ranges of tasks.

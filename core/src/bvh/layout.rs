@@ -19,9 +19,10 @@
 //!   division of a crowded bin: one more root for each. A crowded bin has more than [`CROWD`] triangles, and divisions
 //!   nest at most [`DIVISIONS`] deep.
 //!
-//! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles. A bin is
-//! sorted with `spare` as the second buffer. Only bins of more than [`CROWD`] entries need more of it than the length
-//! of the largest bin: room for their centres that the index does not have, 8 bytes a triangle without an index.
+//! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles, or a
+//! single one. A unit is sorted with `spare` as the second buffer, of as many entries. More of it is needed by
+//! several tasks, for the centres of crowded bins that have no room in the index (8 bytes a triangle without an index),
+//! and for keys and the tree on top where the index has no room for them.
 //!
 //! So constants bound index and scratch, those of a build with one task (`HGRID_INDEX_BOUND`, 16 n + 640, and
 //! `HGRID_SCRATCH_BOUND`, 17 n + 320, in C; a test compares them for many `n`):
@@ -78,7 +79,7 @@ pub(crate) const fn most_of_root(triangles: usize) -> usize {
     NODES_PER_TRIANGLE_BELOW as usize * triangles / WHOLE as usize
 }
 
-/// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
+/// Bins with more entries are crowded: they come first. Those with more than [`MOST_UNIT`] are divided.
 pub(crate) const CROWD: usize = 4096;
 
 /// Entries of a unit of bins that is not divided, at most: a bin, and before and behind it fewer entries than a root
@@ -94,7 +95,8 @@ const MOST_BITS: u32 = 18;
 /// The entry of a triangle during a build: its key, then its id.
 pub(crate) type Entry = [u32; 2];
 
-/// The most triangles of a tree: a place on the stack of a query names a node and a child in 32 bits.
+/// The most triangles of a tree: it then has fewer than 2^29 nodes, and a place on the stack of a query has 32 bits for
+/// the number of a node and a slot of three bits.
 pub(crate) const MOST_TRIANGLES: u32 = 1 << 31;
 
 /// Bits of a key that choose one of the bins for so many triangles: sixteen or more a bin on average.

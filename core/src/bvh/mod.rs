@@ -3,8 +3,8 @@
 //! Quality `fast` builds it from a grid of the triangles' centres, quality `high` by SAH over single triangles
 //! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get a finer grid of their
 //! own. Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes
-//! of up to eight children in eight bits a side, those of thin children also as f32 ([`fine`]); a leaf keeps up to
-//! eight ids. Triangles stay in the caller's mesh.
+//! of up to eight children in eight bits a side. Some nodes, mostly those with a thin child, keep them as f32, too
+//! ([`fine`]). A leaf keeps up to eight ids. Triangles stay in the caller's mesh.
 //!
 //! ```text
 //! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side | fine sides |
@@ -27,10 +27,14 @@
 //!
 //! Terms of the build:
 //!
-//! - A *unit* is a group of bins that are cut into subtrees together ([`units`]).
+//! - A *bin* is a cell of the grid. The high bits of a triangle's key choose it ([`key`]). The bins of [`cut`] are
+//!   something else: intervals of an axis.
+//! - An *entry* is the key and the id of a triangle ([`layout::Entry`]).
+//! - A *unit* is a bin, or several that follow one another, whose entries are cut into subtrees together ([`units`]).
 //! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own. With more than
-//!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres.
-//! - A *root* is the top node of a subtree; the subtree itself is called so, too ([`roots`]).
+//!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres ([`crowd`]).
+//! - A *root* is the top node of a subtree; the subtree itself is called so, too ([`roots`]). The top node of the
+//!   whole tree is called the root of the tree.
 //! - A *seam* is a place between units where a task may end ([`units::is_seam`]).
 //!
 //! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011; SAH in bins,

@@ -176,8 +176,9 @@ fn nearer<S: Simd>(one: Vectors<S>, other: Vectors<S>) -> Vectors<S> {
     ]
 }
 
-/// Lower bounds of the squared distances from zero to triangles: to the planes across a direction of which
-/// the triangles lie on the other side. `far` is [`DOTS`] of the distance of their corners.
+/// Lower bounds of the squared distances from zero to triangles. A plane across the direction goes through the nearest
+/// corner of each, so that the triangle lies behind it; the bound is the squared distance of that plane. `far` is
+/// [`DOTS`] times the largest sum of magnitudes of a corner.
 #[inline(always)]
 fn across<S: Simd>(
     simd: S,

@@ -30,7 +30,8 @@ pub(crate) const WIDTH: usize = 8;
 /// Ids in a leaf, at most: one vector of triangles.
 pub(crate) const LEAF: usize = 8;
 
-/// Triangles that a query reads at once: a leaf of fewer takes as long. Such leaves are not cut.
+/// Triangles that are read into one set of vectors: a leaf of fewer takes as long, one of more takes two sets. A part
+/// of so many or fewer is small, and hardly ever cut.
 pub(crate) const SMALL_LEAF: usize = 4;
 
 /// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one minimum.

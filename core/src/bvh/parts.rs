@@ -2,7 +2,10 @@
 //!
 //! ```text
 //! parts = [range]
-//! until there are eight: choose the part with the largest surface, leaves last; cut it in two (cut.rs)
+//! until there are eight, or all are small: choose a part, cut it in two (cut.rs)
+//!     choose: of the parts that become nodes the one with the largest surface;
+//!             if there are none, of the leaves the one with the largest surface times count
+//!     from a level on, in the place of both: choose the part with the most items, cut it in the middle
 //! ```
 //!
 //! An item is a triangle in a tree of quality `high`, the root of a subtree in one of quality `fast`.
@@ -91,8 +94,8 @@ impl Cutter {
         Self { limits, level: SimdLevel::detect(), unit, bins: Bins::new() }
     }
 
-    /// Cuts a range into eight parts in the order of its items, or into small ones if there are fewer. They become
-    /// the children of a node with `level` levels above.
+    /// Cuts a range into eight parts, or into small ones if there are fewer. Moves the items, so that each part is a
+    /// range. The parts become the children of a node with `level` levels above.
     pub(crate) fn parts(&mut self, items: &mut [Item], range: &Range<u32>, level: u32) -> Parts {
         let halve = level >= self.limits.halved_from;
         let mut parts = Parts::one(range);

@@ -50,7 +50,8 @@ pub(crate) struct Rays {
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
-    /// The point that boxes and origins are relative to: the origin of the first ray that is not done.
+    /// The point that boxes and origins are relative to: the origin of the first ray that was ready. It stays the same
+    /// when that ray ends.
     pub(crate) center: [f32; 3],
     /// 2^-21 of the largest coordinate of an origin relative to `center`: boxes grow by it, to cover eight roundings.
     spread: f32,
@@ -73,7 +74,8 @@ pub(crate) struct Rays {
     /// The start of each ray as a scaled distance, not widened.
     given_start: PerRay,
     given: [Ray; GROUP],
-    /// The closest hit of each ray so far. Before the first it is a miss, whose `t` is the end.
+    /// The closest hit of each ray so far. Before the first it is a miss, of which
+    /// [`take_until`](Self::take_until) may have set the `t`.
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
     pair_places: [u32; PAIRS],

@@ -133,10 +133,11 @@ impl Roots<'_> {
         self.cut(range);
     }
 
-    /// Makes roots of entries that are sorted by key; those of a unit that is still crowded after [`DIVISIONS`]
-    /// divisions are sorted by bin alone, which makes worse boxes. Splits them where the highest bit changes in which
-    /// their keys differ, or in the middle if all are equal, until parts are small enough; none is smaller than a
-    /// piece.
+    /// Makes roots of the entries of a unit, which are sorted by key. A range of more than [`MOST_ROOT`] entries is
+    /// split in two: where the highest bit changes in which the keys of its ends differ, or in the middle if they are
+    /// equal. No part has fewer than [`LEAST_PIECE`] entries.
+    ///
+    /// A unit that is still too large after [`DIVISIONS`] divisions is sorted by bin alone, which makes worse boxes.
     fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {

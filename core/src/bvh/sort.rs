@@ -1,4 +1,4 @@
-//! Sorts the entries of a bin by their keys: a radix sort from the low bits up, stable, in the cache.
+//! Sorts the entries of a unit by their keys: a radix sort from the low bits up, stable, in the cache.
 //!
 //! ```text
 //! up to 24 entries   insertion
@@ -6,7 +6,7 @@
 //!                    count the entries of each digit, sum up the counts, move the entries
 //! ```
 //!
-//! All keys of a bin share their high bits, so only the low ones are sorted by.
+//! The caller tells how many low bits may differ within the unit; only these are sorted by.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u16x8};

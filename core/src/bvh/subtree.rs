@@ -85,8 +85,8 @@ pub(crate) enum Cut {
 
 /// Entries of a part that is small, at most.
 const SMALL: u8 = SMALL_LEAF as u8;
-/// The number of bits that also cut small parts, from the first that changes in the range; of the others each counts
-/// that changes anywhere in the subtree.
+/// The number of bits of the keys that may cut small parts, too: the highest that changes in the range, and the next
+/// lower that changes anywhere in the subtree.
 const FREE_BITS: u32 = 2;
 
 /// A range of entries.
@@ -414,8 +414,9 @@ fn parts(range: EntryRange, bits: u32, places: &[u128; 32]) -> ([EntryRange; WID
     (parts, top)
 }
 
-/// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer, but those that would
-/// cut a small part. Also returns the lowest bit that was looked at.
+/// Finds up to seven places inside a range at which to cut it: those where the highest bits of the keys change. A place
+/// that would cut a small part is left out, except for the first [`FREE_BITS`] bits. Returns a mask of the places, and
+/// the lowest bit of the keys that was looked at.
 #[inline(always)]
 fn highest(range: EntryRange, bits: u32, places: &[u128; 32]) -> (u128, u8) {
     // A range of one entry or none has no inside.

@@ -3,7 +3,8 @@
 //! ```text
 //! parts = [all roots]
 //! until there are eight: cut the part with the largest surface by binned SAH (parts.rs)
-//!                        (16 bins an axis at most, by centre; an item costs ceil(triangles / 4))
+//!                        (16 bins an axis at most, by centre; an item costs ceil(triangles / 4));
+//!                        from level 20 on: cut the part with the most roots in the middle
 //! parts of one root become that root's node, the others nodes of their own, breadth first
 //! ```
 

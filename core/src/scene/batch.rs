@@ -13,7 +13,8 @@ use crate::ray::RayF64;
 use crate::simd::HAS_VECTORS;
 
 impl Scene<'_> {
-    /// The closest hit of each ray, an array of [`RayF64`]; [`SceneHit::MISS`] where there is none. The options are
+    /// Finds the closest hit of each ray. `rays` has elements of type [`RayF64`], `hits` as many of type
+    /// [`SceneHit`]; a ray without a hit gets [`SceneHit::MISS`]. `coherence` changes the time alone. The options are
     /// for all rays.
     ///
     /// # Errors
@@ -51,7 +52,8 @@ impl Scene<'_> {
         trace(self, batch, coherence, options);
     }
 
-    /// For each ray, an array of [`RayF64`], a byte: 1 if anything is hit, 0 if not. The options are for all rays.
+    /// Tells for each ray whether it hits anything. `rays` has elements of type [`RayF64`], `occluded` as many bytes: 1
+    /// for a hit, 0 for none. `coherence` changes the time alone. The options are for all rays.
     ///
     /// # Errors
     /// The same as of [`intersect_n`](Self::intersect_n).

@@ -33,15 +33,16 @@ use crate::ray::{Ray, RayF64, round};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Instance {
-    /// Rows of the matrix that takes the object's directions to the scene's. It may mirror, shear and scale if the matrix
-    /// times its inverse, rounded to f32, differs from the identity by at most 2^-10. Scales along the axes may have any
-    /// ratio; a matrix that rotates or shears, too, may have a condition number up to about 10^4.
+    /// Rows of the matrix that takes the object's directions to the scene's. It may mirror, shear and scale if the
+    /// matrix times its inverse, rounded to f32, differs from the identity by at most 2^-10. Scales along the axes may
+    /// have any ratio; a matrix that rotates or shears, too, may have a condition number up to about 10^4.
     pub linear: [[f32; 3]; 3],
     /// Number of the object among those of the scene.
     pub object: u32,
     /// Position of the object's origin in the scene.
     pub translation: [f64; 3],
-    /// Queries see the instance if their mask and this have a bit in common.
+    /// A query sees the instance if its mask and this have a bit in common. A query whose mask has all bits, the
+    /// default, sees every instance, even one whose mask is 0.
     pub mask: u32,
     /// The caller's own, not read.
     pub id: u32,

@@ -229,8 +229,8 @@ impl<'a> Scene<'a> {
         Some(*self.place(hit)?.object)
     }
 
-    /// Takes a normal from the space of the object that a hit names to the scene's; of length 1. `None` if the hit
-    /// names none, or the normal is null.
+    /// Takes a normal, of any length, from the space of the object that a hit names to the scene's; the result has
+    /// length 1. `None` if the hit names no object, or the normal is zero.
     #[must_use]
     pub fn normal_of(&self, hit: &SceneHit, normal: [f32; 3]) -> Option<[f32; 3]> {
         let normal = DVec3::from_array(normal.map(f64::from));

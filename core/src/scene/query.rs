@@ -85,8 +85,8 @@ pub type SceneFilter<'q> = dyn FnMut(usize, &SceneHit) -> Verdict + 'q;
 
 /// The options of a query of a scene. `SceneOptions::default()` changes nothing.
 pub struct SceneOptions<'q> {
-    /// An instance or a triangle is seen if its mask and this have a bit in common. With all bits, the
-    /// default, everything is seen, even with a mask of 0.
+    /// An instance is seen if its mask and this have a bit in common. In it, each triangle and shape is seen if its own
+    /// mask has one. With all bits, the default, everything is seen, even with a mask of 0.
     pub mask: u32,
     /// The sides of triangles that are not hit. The front is decided in the space of the triangle's own mesh: an
     /// instance that mirrors does not turn it round.

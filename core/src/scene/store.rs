@@ -239,8 +239,9 @@ impl<'a> Scene<'a> {
         Ok(count.ok_or(corrupt(offset_of!(Header, triangle_count)))? as usize)
     }
 
-    /// Proves that the scene is one of its objects: the tree, and the box of every instance.
-    /// O(instances); the objects have proofs of their own.
+    /// Proves that the blob is a scene over the objects that it was opened with: checks the tree, the box of every
+    /// instance and the table, in O(instances). The objects have proofs of their own. `scratch` has
+    /// [`validate_bytes`](Self::validate_bytes) bytes or more.
     ///
     /// # Errors
     /// The errors of [`Grid::validate`].
@@ -278,13 +279,15 @@ impl<'a> Scene<'a> {
         self.tree.validate_bytes()
     }
 
-    /// Gives a built scene instances that moved: in place, O(n), without scratch. Their number is that of the build.
-    /// [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the scene again afterwards.
+    /// Gives a built scene instances that moved: in place, O(n), without scratch. `index` holds the scene's blob, and
+    /// there are as many instances as in the build. Call it also if an object changed and no instance moved: a scene
+    /// keeps the boxes that its objects had. [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the
+    /// scene again afterwards.
     ///
     /// # Errors
-    /// [`Error::MeshMismatch`] for another number of instances; those of [`open`](Self::open), after which the
-    /// scene is as it was. After [`Error::InstanceWithoutObject`], [`Error::InstanceWithoutInverse`] and
-    /// [`Error::Corrupt`] it holds nothing of use.
+    /// [`Error::MeshMismatch`] for another number of instances, and those of [`open`](Self::open). After
+    /// [`Error::InstanceWithoutObject`], [`Error::InstanceWithoutInverse`] and [`Error::Corrupt`] the blob may hold
+    /// nothing of use; after all others it is as it was.
     ///
     /// ```
     #[doc = include_str!("../../doc/scene.txt")]

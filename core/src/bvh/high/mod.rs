@@ -5,7 +5,7 @@
 //! top       nodes over all items, until ranges are small enough for tasks   (grow.rs)
 //! below     the nodes over each of these ranges
 //!
-//! index   | header | ids: of top nodes' leaves, then of each range | nodes: top | below each range |
+//! index   | header | ids: of top nodes' leaves, then of each range | nodes: top | below each range | fine sides |
 //! scratch | items: 32 B a triangle; the record of a range that is done replaces its items  | fine sides |
 //! ```
 //!
