@@ -54,11 +54,10 @@
  *   }
  *
  *   cargo build --release -p hgrid-capi
- *   cc program.c -Iinclude -Ltarget/release -lhgrid -Wl,-rpath,"$PWD/target/release"
+ *   cc program.c -Iinclude target/release/libhgrid.a
  *
- * The linker prefers libhgrid.so, which the program then looks for when it starts: the rpath says
- * where (or LD_LIBRARY_PATH does). In place of -L and -l, name target/release/libhgrid.a: then hgrid
- * becomes part of the program. Neither needs any other library or linker flag.
+ * The library becomes part of the program and needs no other one. docs/install.md tells how to link a
+ * shared library.
  *
  * Memory
  * ------
@@ -83,8 +82,9 @@
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
  * byte order must be the same. hgrid_grid is only a view of blob and mesh.
  *
- * The mesh stays yours and stays where it is: it is read at every query. To change vertices, change
- * them while no query runs, and build again, in the same regions if you like.
+ * The mesh stays yours and stays where it is: it is read at every query. To move vertices, write them
+ * while no query runs; then call hgrid_refit, or build again, in the same regions if you like; then
+ * refit the scenes that show the grid.
  *
  * Methods
  * -------
@@ -156,7 +156,8 @@
  * Structs do not change within 0.1.x. A later version may add fields at the end, where 0 means what
  * was before. A larger struct from a program that was compiled with a later header is accepted as
  * long as all that this version does not know is 0. A value that this version does not know is an
- * error, never ignored.
+ * error, not a default; only fields that belong to another method are not read, and an unknown verdict
+ * of a filter counts as HGRID_REJECT.
  *
  * Errors
  * ------
@@ -281,7 +282,8 @@
 #define HGRID_VERSION_STRING "0.1.0"
 
 /**
- * Every memory region starts at a multiple of this many bytes: index, scratch and blob.
+ * These start at a multiple of this many bytes: index, every blob, the `views` of `hgrid_open_packed_scene`, and the
+ * scratch of builds, `hgrid_sizes` and `hgrid_fit`. All other scratch may start anywhere.
  */
 #define HGRID_ALIGNMENT 64
 
@@ -757,11 +759,12 @@ typedef uint32_t hgrid_verdict;
  * triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
  * alone: other triangles, the method and the box of the grid do not change a bit of it.
  *
- * There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the
- * origin, Z the range of `t` between the vertices. The reported hit is the exact hit of a triangle whose
- * vertices are moved by up to 2^-50 L across the ray, with these errors: `u` and `v` up to 2^-24 + 2^-38
- * of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up to 2^-149. A vertex is
- * moved alike for all triangles that share it, so no ray passes between them.
+ * There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the ray's
+ * origin. The `t` of a vertex is its coordinate relative to the origin, divided by the direction, both on the axis
+ * along which the direction is longest; Z is the largest `t` of the three vertices minus the least. The reported
+ * hit is the exact hit of a triangle whose vertices are moved by up to 2^-50 L across the ray, with these errors:
+ * `u` and `v` up to 2^-24 + 2^-38 of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
+ * to 2^-149. A vertex is moved alike for all triangles that share it, so no ray passes between them.
  *
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's
  * line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
@@ -1248,7 +1251,8 @@ typedef struct hgrid_instance {
      */
     double translation[3];
     /**
-     * Queries see the instance if their mask and this have a bit in common.
+     * A query sees the instance if its mask and this have a bit in common. A query whose mask has all bits, the
+     * default, sees every instance, even one whose mask is 0.
      */
     uint32_t mask;
     /**
@@ -1323,9 +1327,9 @@ typedef struct hgrid_scene_options {
      */
     uint32_t struct_size;
     /**
-     * An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all
-     * bits, the default, everything is seen. 0 sees nothing, and no error tells: begin with
-     * `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
+     * An instance is seen if its mask and this have a bit in common. In it, each triangle and shape is seen if its own
+     * mask has one. With all bits, the default, everything is seen, even with a mask of 0. 0 sees nothing, and no
+     * error tells: begin with `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
      */
     uint32_t mask;
     /**
@@ -1862,13 +1866,14 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
  * is too small, what both need; or the triangle that is to blame.
  *
- * After an error `index` is unchanged, except in three cases in which it may hold anything: after a cancelled
- * build; with `HGRID_METHOD_BVH` after any error of a build that began; with `HGRID_METHOD_VARIABLE` and
- * `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. Queries on a
- * view of the grid that lay there before are safe, but their answers are wrong: set the view to
- * `HGRID_GRID_INIT` (`grid` itself, if a build is repeated). If the index is too small, these three methods
- * continue without writing and compute the size: the report's `index_bytes` is exact (with bvh maybe only
- * enough), and the same call with that much succeeds.
+ * After an error `index` is unchanged, except in these cases, in which it may hold anything: after any error with
+ * `HGRID_METHOD_BVH`; with all methods after `HGRID_ERROR_CANCELLED`; with `HGRID_METHOD_VARIABLE` and
+ * `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. In these cases
+ * queries on views of the grid that lay there before are safe, but answer wrongly. Clear such views, also `grid` if it
+ * was one: `view = (hgrid_grid)HGRID_GRID_INIT`.
+ *
+ * If the index is too small, bvh, variable and recursive go on without writing, to compute the size: the report's
+ * `index_bytes` is exact (with bvh maybe only enough), and the same call with that much succeeds.
  *
  * A build allocates nothing and needs at most 18 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13
@@ -2732,14 +2737,16 @@ hgrid_status hgrid_open_scene(const void *blob,
                               struct hgrid_scene *scene);
 
 /**
- * Gives a built scene instances that moved: in place, without scratch, in less than the time of a build.
+ * Gives a built scene instances that moved: in place, without scratch, in less than the time of a build. Call it also
+ * if an object changed and no instance moved: a scene keeps the boxes that its objects had.
  *
  * There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
- * `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
- * reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
- * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are
- * as they were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
- * report's `triangle`, after which the blob holds nothing of use.
+ * `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the reason
+ * and leaves `scene` as it was: `HGRID_ERROR_MESH_MISMATCH` for another number of instances; what `hgrid_open_scene`
+ * returns; `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` or `HGRID_ERROR_OVERLAP`;
+ * `HGRID_ERROR_INSTANCE_OBJECT` or `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the report's
+ * `triangle`. After the last two, and if the blob is corrupt, it may hold nothing of use; after all others it is as it
+ * was.
  *
  * Threads: as for `hgrid_refit`.
  */

@@ -242,13 +242,14 @@ pub unsafe extern "C" fn hgrid_fit(
 /// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
 /// is too small, what both need; or the triangle that is to blame.
 ///
-/// After an error `index` is unchanged, except in three cases in which it may hold anything: after a cancelled
-/// build; with `HGRID_METHOD_BVH` after any error of a build that began; with `HGRID_METHOD_VARIABLE` and
-/// `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. Queries on a
-/// view of the grid that lay there before are safe, but their answers are wrong: set the view to
-/// `HGRID_GRID_INIT` (`grid` itself, if a build is repeated). If the index is too small, these three methods
-/// continue without writing and compute the size: the report's `index_bytes` is exact (with bvh maybe only
-/// enough), and the same call with that much succeeds.
+/// After an error `index` is unchanged, except in these cases, in which it may hold anything: after any error with
+/// `HGRID_METHOD_BVH`; with all methods after `HGRID_ERROR_CANCELLED`; with `HGRID_METHOD_VARIABLE` and
+/// `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. In these cases
+/// queries on views of the grid that lay there before are safe, but answer wrongly. Clear such views, also `grid` if it
+/// was one: `view = (hgrid_grid)HGRID_GRID_INIT`.
+///
+/// If the index is too small, bvh, variable and recursive go on without writing, to compute the size: the report's
+/// `index_bytes` is exact (with bvh maybe only enough), and the same call with that much succeeds.
 ///
 /// A build allocates nothing and needs at most 18 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
 /// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13

@@ -50,11 +50,12 @@ pub struct hgrid_ray {
 /// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
 /// alone: other triangles, the method and the box of the grid do not change a bit of it.
 ///
-/// There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the
-/// origin, Z the range of `t` between the vertices. The reported hit is the exact hit of a triangle whose
-/// vertices are moved by up to 2^-50 L across the ray, with these errors: `u` and `v` up to 2^-24 + 2^-38
-/// of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up to 2^-149. A vertex is
-/// moved alike for all triangles that share it, so no ray passes between them.
+/// There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the ray's
+/// origin. The `t` of a vertex is its coordinate relative to the origin, divided by the direction, both on the axis
+/// along which the direction is longest; Z is the largest `t` of the three vertices minus the least. The reported
+/// hit is the exact hit of a triangle whose vertices are moved by up to 2^-50 L across the ray, with these errors:
+/// `u` and `v` up to 2^-24 + 2^-38 of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
+/// to 2^-149. A vertex is moved alike for all triangles that share it, so no ray passes between them.
 ///
 /// The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's
 /// line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,

@@ -33,7 +33,8 @@ pub struct hgrid_instance {
     /// The place of the object's origin in the scene. Places are computed in double: far from the scene's origin rays
     /// are traced as exactly as near it.
     pub translation: [f64; 3],
-    /// Queries see the instance if their mask and this have a bit in common.
+    /// A query sees the instance if its mask and this have a bit in common. A query whose mask has all bits, the
+    /// default, sees every instance, even one whose mask is 0.
     pub mask: u32,
     /// Yours: not read.
     pub id: u32,
@@ -112,9 +113,9 @@ pub struct hgrid_scene_hit {
 pub struct hgrid_scene_options {
     /// `sizeof(hgrid_scene_options)`.
     pub struct_size: u32,
-    /// An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all
-    /// bits, the default, everything is seen. 0 sees nothing, and no error tells: begin with
-    /// `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
+    /// An instance is seen if its mask and this have a bit in common. In it, each triangle and shape is seen if its own
+    /// mask has one. With all bits, the default, everything is seen, even with a mask of 0. 0 sees nothing, and no
+    /// error tells: begin with `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
     pub mask: u32,
     /// The sides of triangles that are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own
     /// mesh: an instance that mirrors does not turn it round.
@@ -372,14 +373,16 @@ pub unsafe extern "C" fn hgrid_open_scene(
     opened.err().unwrap_or(HGRID_OK)
 }
 
-/// Gives a built scene instances that moved: in place, without scratch, in less than the time of a build.
+/// Gives a built scene instances that moved: in place, without scratch, in less than the time of a build. Call it also
+/// if an object changed and no instance moved: a scene keeps the boxes that its objects had.
 ///
 /// There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
-/// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
-/// reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
-/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are
-/// as they were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
-/// report's `triangle`, after which the blob holds nothing of use.
+/// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the reason
+/// and leaves `scene` as it was: `HGRID_ERROR_MESH_MISMATCH` for another number of instances; what `hgrid_open_scene`
+/// returns; `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` or `HGRID_ERROR_OVERLAP`;
+/// `HGRID_ERROR_INSTANCE_OBJECT` or `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the report's
+/// `triangle`. After the last two, and if the blob is corrupt, it may hold nothing of use; after all others it is as it
+/// was.
 ///
 /// Threads: as for `hgrid_refit`.
 ///
