@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use zerocopy::FromZeros;
+
 use crate::counters::Counters;
 use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, INVALID_ID};
@@ -11,7 +13,7 @@ use crate::ray::{Hit, INVALID_ID};
 /// The front is where a triangle's vertices appear counter-clockwise. A triangle seen exactly edge
 /// on shows neither side, and is never hit.
 #[repr(u32)]
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, FromZeros)]
 pub enum Cull {
     /// Both sides are hit.
     #[default]
@@ -140,7 +142,7 @@ impl<'q> QueryOptions<'q> {
 }
 
 /// Masks, culling, the triangle to skip, and which triangles the filter is asked about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromZeros)]
 pub(crate) struct Choice {
     mask: u32,
     skip: u32,

@@ -3,7 +3,7 @@
 //! A ray goes on with the nearest child of a node and pushes the others, the nearest last. A child that begins
 //! behind the end of the ray when it is popped is dropped.
 
-use zerocopy::{FromBytes, IntoBytes, transmute_mut};
+use zerocopy::{FromBytes, FromZeros, IntoBytes, transmute_mut};
 
 use super::Bvh;
 use super::layout::LEVELS;
@@ -97,16 +97,14 @@ pub(super) struct GroupEntry {
     pub(super) rays: u64,
 }
 
-impl GroupEntry {
-    const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
-}
-
 /// The stack of a group.
+#[derive(FromZeros)]
 pub(crate) struct GroupStack([GroupEntry; STACK]);
 
 impl GroupStack {
-    pub(crate) const fn new() -> Self {
-        Self([GroupEntry::NONE; STACK])
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self::new_zeroed()
     }
 
     #[inline(always)]
