@@ -19,7 +19,6 @@
 use glam::Vec3A;
 
 use crate::aabb::{Aabb, greater};
-use crate::filter::Reach;
 use crate::ray::{Ray, RayF64, round};
 
 /// Origins farther than this many extents from the box's centre are moved.
@@ -44,6 +43,31 @@ pub(crate) struct LineF64 {
 impl From<&RayF64> for LineF64 {
     fn from(ray: &RayF64) -> Self {
         Self { origin: ray.origin, direction: ray.direction.map(f64::from) }
+    }
+}
+
+/// The distance of triangles from a point, and their extent.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reach {
+    /// The most that a coordinate of a corner differs from the point's.
+    pub(crate) distance: f64,
+    /// The most that a coordinate differs between corners of a triangle.
+    pub(crate) extent: f64,
+}
+
+impl Reach {
+    /// Returns the reach of triangles in a box.
+    #[inline(always)]
+    pub(crate) fn of(bounds: &Aabb, point: [f32; 3]) -> Self {
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let (mut distance, mut extent) = (0.0, 0.0);
+        for axis in 0..3 {
+            let at = f64::from(point[axis]);
+            let (low, high) = (f64::from(min[axis]), f64::from(max[axis]));
+            distance = greater(distance, greater((low - at).abs(), (high - at).abs()));
+            extent = greater(extent, high - low);
+        }
+        Self { distance, extent }
     }
 }
 

@@ -24,16 +24,16 @@
 //! N          those of T and of s det, a product 1, a difference 1                       54 u G E^2 + 108 u |s| E^2
 //! ```
 //!
-//! The f64 test moves the corners by at most m = 7 * 2^-53 R on each of the two axes across the ray; R is the filter's,
-//! no less than G and half of E. Depths stay what they are. If no corner lies before the start, neither does the point
+//! The f64 test moves the corners by at most m = 7 * 2^-53 M on each of the two axes across the ray; M is G + E, as in
+//! the filter. Depths stay what they are. If no corner lies before the start, neither does the point
 //! where the ray meets the moved triangle: N / det of that is not negative. Else the test decides exactly, on the
 //! triangle as it is. The move changes T by at most 24 m E (G + E) and det by at most 32 m E; the second order in m is
 //! below 28 m^2 (G + E) and 16 m^2.
 //!
 //! ```text
-//! error    E (56 u E + 2^-24 slope) + floor       slope is at least 29 u R, so the second term covers the changes;
-//!                                                 floor is at least 28 m^2 + 2^-120
-//! bound    error (G + E + 2 |s|) + 2^-120         floor and 2^-120 cover what underflows
+//! error    E (56 u E + 2^-45 M) + floor       2^-45 is more than 32 * 7 * 2^-53, so the second term covers the
+//!                                             changes; floor is at least 28 m^2 + 2^-120
+//! bound    error (M + 2 |s|) + 2^-120         floor and 2^-120 cover what underflows
 //! |det| must exceed 1.6 error: more than 84 u E^2 and its change, so that no move turns the triangle round
 //! ```
 
@@ -41,8 +41,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 
 use crate::aabb::Aabb;
-use crate::extremes::Extremes;
-use crate::filter::{LineFilter, cross, dot, greatest, minus};
+use crate::filter::{LineFilter, Size, cross, dot, minus};
 
 /// The largest extent of a box around all triangles with which T does not overflow: G is less than 2^41 then, because
 /// no origin lies farther than [`FAR_EXTENTS`](crate::approach::FAR_EXTENTS) away, and E is at most 2^38.
@@ -50,8 +49,8 @@ const MOST_EXTENT: f32 = 262_144.0 * 1_048_576.0; // 2^38
 
 /// 56 * 2^-24.
 const UNITS: f32 = 56.0 / 16_777_216.0;
-/// The part of the filter's slope that covers what moves the corners: 2^-24.
-const OF_SLOPE: f32 = 1.0 / 16_777_216.0;
+/// What moves the corners, in parts of their distance: 2^-45.
+const OF_REACH: f32 = 1.0 / (32.0 * 1_048_576.0 * 1_048_576.0);
 /// More than what underflows: 2^-120.
 const LEAST: f32 = f32::from_bits(0x0380_0000);
 
@@ -71,6 +70,7 @@ impl<S: Simd> LineFilter<f32x8<S>> {
         &self,
         simd: S,
         [a, b, c]: &[[f32x8<S>; 3]; 3],
+        size: &Size<f32x8<S>>,
         start: f32x8<S>,
     ) -> mask32x8<S> {
         let g = minus(self.origin, *a);
@@ -79,11 +79,10 @@ impl<S: Simd> LineFilter<f32x8<S>> {
         let det = dot(e, cross(self.direction, f));
         let ahead = (-start).mul_add(det, dot(f, cross(g, e)));
 
-        let longest = greatest(e).greater(greatest(f));
-        let of_slope = longest.mul_add(f32x8::splat(simd, UNITS), self.slope * OF_SLOPE);
-        let error = longest.mul_add(of_slope, self.floor);
-        let reach = greatest(g) + longest + start.abs() * 2.0;
-        let bound = error.mul_add(reach, f32x8::splat(simd, LEAST));
+        let Size { longest, reach } = *size;
+        let of_longest = longest.mul_add(f32x8::splat(simd, UNITS), reach * OF_REACH);
+        let error = longest.mul_add(of_longest, self.floor);
+        let bound = error.mul_add(reach + start.abs() * 2.0, f32x8::splat(simd, LEAST));
         // Change the sign where det is negative, as a division by det would.
         let sign = det.bitcast::<u32x8<S>>() & 0x8000_0000;
         let ahead = (ahead.bitcast::<u32x8<S>>() ^ sign).bitcast::<f32x8<S>>();
@@ -94,7 +93,8 @@ impl<S: Simd> LineFilter<f32x8<S>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::{RayFilter, Reach, splat};
+    use crate::approach::Reach;
+    use crate::filter::{RayFilter, splat};
     use crate::mesh::Triangle;
     use crate::ray::Ray;
     use crate::samples::{Random, along, largest, line, triangle};
@@ -112,7 +112,9 @@ mod tests {
             let Self(filter, triangle, start) = self;
             let start = f32x8::splat(simd, start);
             let corners = splat(simd, triangle);
-            let dropped = filter.splat(simd).passes_before(simd, &corners, start).to_bitmask();
+            let filter = filter.line.splat(simd);
+            let size = Size::new(filter.origin, &corners);
+            let dropped = filter.passes_before(simd, &corners, &size, start).to_bitmask();
             assert!(dropped == 0 || dropped == 0xff, "{dropped:x}");
             dropped != 0
         }

@@ -210,6 +210,7 @@ mod tests {
     use super::*;
     use crate::aabb::Aabb;
     use crate::approach::Approach;
+    use crate::filter::Size;
     use crate::mesh::{IndexType, Strided, Triangle};
     use crate::ray::{Hit, Ray, round};
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
@@ -285,7 +286,10 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Answer {
             let Self { ray, mesh, ids } = self;
             let eight = Eight::of(simd, mesh, first_eight(ids), ids.len());
-            let dropped = ray.filter.splat(simd).drops(&eight.corners).to_bitmask();
+            let filter = ray.filter.line.splat(simd);
+            let reach = f32x8::splat(simd, ray.filter.reach);
+            let size = Size { reach, ..Size::new(filter.origin, &eight.corners) };
+            let dropped = filter.drops(&eight.corners, &size).to_bitmask();
             let survivors = !u32::try_from(dropped).unwrap() & eight.used;
             let lanes = (0..LANES).filter(|lane| survivors >> lane & 1 == 1);
             let hits = lanes.filter_map(|lane| {

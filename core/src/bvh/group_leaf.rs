@@ -92,13 +92,19 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
             for &id in ids {
                 let Some(triangle) = mesh.triangle(id) else { continue };
                 let corners = crate::filter::splat(simd, &triangle);
+                let size = rays.size_of(simd, &corners);
                 for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
                     let of_octet = mask >> (8 * octet) & 0xff;
                     if of_octet == 0 {
                         continue;
                     }
-                    let dropped = bits(rays.filters(simd, octet).drops(&corners));
-                    let mut survivors = of_octet & !u64::from(dropped);
+                    let filter = rays.filters(simd, octet);
+                    let mut dropped = filter.drops(&corners, &size);
+                    if rays.may_leave {
+                        let start = rays.starts_of(simd, octet);
+                        dropped |= filter.passes_before(simd, &corners, &size, start);
+                    }
+                    let mut survivors = of_octet & !u64::from(bits(dropped));
                     while survivors != 0 {
                         let ray = first + survivors.trailing_zeros();
                         survivors &= survivors - 1;
@@ -122,15 +128,16 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
 ) {
     let Leaf { bvh, mesh, first, ids, .. } = *leaf;
     let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
+    let size = rays.size_of(simd, &triangles.corners);
     let mut rest = mask;
     while rest != 0 {
         let ray = rest.trailing_zeros();
         rest &= rest - 1;
         let filter = rays.filter(simd, ray);
-        let mut dropped = filter.drops(&triangles.corners);
+        let mut dropped = filter.drops(&triangles.corners, &size);
         if rays.may_leave {
             let start = rays.start_of(simd, ray);
-            dropped |= filter.passes_before(simd, &triangles.corners, start);
+            dropped |= filter.passes_before(simd, &triangles.corners, &size, start);
         }
         let mut survivors = !bits(dropped) & triangles.used;
         while survivors != 0 {

@@ -19,7 +19,7 @@ use crate::approach::FAR_EXTENTS;
 use crate::before;
 use crate::eight::columns;
 use crate::extremes::Extremes;
-use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
+use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter, Size, nearby_floor};
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
 use crate::pairs;
@@ -45,16 +45,19 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
-    /// True if some origins lie inside the box, so that their rays may leave one of its triangles.
+    /// True if some origins lie inside the box, so that their rays may leave one of its triangles. False if all rays
+    /// start at one point, as those of a camera.
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
+    /// The filter's floor in that box.
+    floor: f32,
     /// The point that boxes and origins are relative to: the origin of the first ray that was ready. It stays the same
     /// when that ray ends.
     pub(crate) center: [f32; 3],
-    /// 2^-21 of the largest coordinate of an origin relative to `center`: boxes grow by it, to cover eight roundings.
-    spread: f32,
-    /// The growth of boxes that covers both: `spread + origin_error`.
+    /// The largest coordinate of an origin relative to `center`.
+    farthest: f32,
+    /// The growth of boxes that covers eight roundings of that and `origin_error`.
     pub(crate) growth: f32,
     inverse: [PerRay; 3],
     /// Minus the origin, relative to the centre, times the inverse direction.
@@ -66,8 +69,6 @@ pub(crate) struct Rays {
     /// For the filter, with origins that are not relative.
     anchor: [PerRay; 3],
     direction: [PerRay; 3],
-    slope: PerRay,
-    floor: PerRay,
     /// Factor from `t` to scaled distance.
     scale: PerRay,
     /// The start of each ray as a scaled distance, not widened.
@@ -118,9 +119,9 @@ impl Rays {
         let (mut alive, mut special) = (0, 0);
         let middle = ((bounds.min + bounds.max) * 0.5).to_array();
         let size = bounds.size();
-        let half = (size * 0.5).to_array();
         let extent = size.max_element();
         self.extent = extent;
+        self.floor = nearby_floor(extent);
         // In a tree of huge extent no ray counts as near: all are traced alone.
         let near = if extent < MOST_EXTENT { FAR_EXTENTS * extent } else { -1.0 };
         let near = f32x8::splat(simd, near);
@@ -180,25 +181,20 @@ impl Rays {
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();
             self.scale[octet] = scale.into();
             self.given_start[octet] = (t_min * scale).into();
-
-            // Compute the error bound of the filter: filter.rs has the proof.
-            let distance = (a + half[0]).greater(b + half[1]).greater(c + half[2]);
-            let filter = LineFilter::scaled(simd, origin, scaled, distance, extent);
-            self.slope[octet] = filter.slope.into();
-            self.floor[octet] = filter.floor.into();
         }
         self.alive = alive;
         self.settle(simd);
         let [x, y, z] = self.origins;
         let center = Vec3A::from(self.center);
         let (low, high) = (Vec3A::new(x[0], y[0], z[0]), Vec3A::new(x[1], y[1], z[1]));
-        self.may_leave = before::pays(bounds, &Aabb { min: center + low, max: center + high });
+        let origins = Aabb { min: center + low, max: center + high };
+        self.may_leave = self.farthest > 0.0 && before::pays(bounds, &origins);
         special
     }
 
     /// Returns true if some origin lies farther from that of the first ray than a part of the extent.
     pub(super) fn are_apart(&self, part: f32) -> bool {
-        self.spread > part * (ROUNDINGS * self.extent)
+        self.farthest > part * self.extent
     }
 
     /// The end of a ray, as a distance.
@@ -234,8 +230,8 @@ impl Rays {
             self.origins[axis] = [low, high];
             farthest = greater(farthest, greater(-low, high));
         }
-        self.spread = farthest * ROUNDINGS;
-        self.growth = self.spread + self.origin_error;
+        self.farthest = farthest;
+        self.growth = farthest * ROUNDINGS + self.origin_error;
     }
 
     /// All rays as one beam, before any of them is done.
@@ -288,6 +284,13 @@ impl Rays {
         }
     }
 
+    /// The sizes of triangles as seen from all origins.
+    #[inline(always)]
+    pub(crate) fn size_of<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> Size<f32x8<S>> {
+        let Size { longest, reach } = Size::new(splat(simd, self.center), corners);
+        Size { longest, reach: reach + self.farthest }
+    }
+
     /// The filter of one ray in all lanes.
     #[inline(always)]
     pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> LineFilter<f32x8<S>> {
@@ -295,8 +298,8 @@ impl Rays {
         LineFilter {
             origin: splat(simd, self.given[ray as usize % GROUP].origin),
             direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
-            slope: f32x8::splat(simd, get(&self.slope, ray)),
-            floor: f32x8::splat(simd, get(&self.floor, ray)),
+            slack: f32x8::splat(simd, 0.0),
+            floor: f32x8::splat(simd, self.floor),
         }
     }
 
@@ -312,9 +315,15 @@ impl Rays {
         LineFilter {
             origin: octet_of(simd, &self.anchor, octet),
             direction: octet_of(simd, &self.direction, octet),
-            slope: f32x8::simd_from(simd, self.slope[octet % OCTETS]),
-            floor: f32x8::simd_from(simd, self.floor[octet % OCTETS]),
+            slack: f32x8::splat(simd, 0.0),
+            floor: f32x8::splat(simd, self.floor),
         }
+    }
+
+    /// The starts of eight rays.
+    #[inline(always)]
+    pub(crate) fn starts_of<S: Simd>(&self, simd: S, octet: usize) -> f32x8<S> {
+        f32x8::simd_from(simd, self.given_start[octet % OCTETS])
     }
 
     /// Returns the rays of a mask that reach a distance.

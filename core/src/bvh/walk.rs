@@ -32,7 +32,7 @@ use crate::budget::Budget;
 use crate::counters::Tally;
 use crate::eight::Eight;
 use crate::extremes::Extremes;
-use crate::filter::RayFilter;
+use crate::filter::{LineFilter, RayFilter, Size};
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::Ray;
@@ -96,7 +96,7 @@ struct Wide<S: Simd> {
     inverse_near: [f32x8<S>; 3],
     inverse_far: [f32x8<S>; 3],
     start: f32x8<S>,
-    filter: RayFilter,
+    filter: LineFilter<f32>,
     /// The start of the ray as a distance, if it may leave a triangle.
     leaves_at: Option<f32>,
 }
@@ -110,7 +110,7 @@ impl<S: Simd> Wide<S> {
             inverse_near: splat(simd, slab.inverse.to_array()),
             inverse_far: splat(simd, slab.inverse_far().to_array()),
             start: f32x8::splat(simd, slab.start),
-            filter: *filter,
+            filter: filter.line,
             leaves_at,
         }
     }
@@ -126,13 +126,15 @@ impl<S: Simd> Wide<S> {
         ids: &[u32],
     ) -> u32 {
         let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
+        let corners = &triangles.corners;
         let filter = self.filter.splat(simd);
-        let mut passed = !bits(filter.drops(&triangles.corners)) & triangles.used;
+        let size = Size::new(filter.origin, corners);
+        let mut passed = !bits(filter.drops(corners, &size)) & triangles.used;
         if passed != 0
             && let Some(start) = self.leaves_at
         {
             let start = f32x8::splat(simd, start);
-            passed &= !bits(filter.passes_before(simd, &triangles.corners, start));
+            passed &= !bits(filter.passes_before(simd, corners, &size, start));
         }
         passed
     }
