@@ -21,21 +21,21 @@
 //! # Proof
 //!
 //! d is the ray's direction, scaled by a power of two so that its largest component lies in [1, 2).
-//! Let R be the largest magnitude of a component of g, E that of e and f, u = 2^-24. The magnitudes of d's components
-//! sum up to less than 6.
+//! Let D be the sum of the magnitudes of its components, R the largest magnitude of a component of
+//! g, E that of e and f, u = 2^-24.
 //!
 //! Multiply out U, V and det into products of three factors. Their magnitudes sum up to no more than
-//! 12 R E, 12 R E and 12 E^2. Each rounding multiplies a product by (1 + r), |r| <= u.
+//! 2 D R E, 2 D R E and 2 D E^2. Each rounding multiplies a product by (1 + r), |r| <= u.
 //!
 //! ```text
 //! error of   roundings of each product                                       bound
-//! U          g 1, f 1, d * f 1, minus 1, g * p 1, sums 2           7     84 u R E
-//! V          g 1, e 1, g * e 1, minus 1, d * q 1, sums 2           7     84 u R E
-//! det        e 1, f 1, d * f 1, minus 1, e * p 1, sums 2           7     84 u E^2
-//! W          those of U, V and det, and two of its own          2 + 2   168 u R E + 108 u E^2
+//! U          g 1, f 1, d * f 1, minus 1, g * p 1, sums 2           7     14 u D R E
+//! V          g 1, e 1, g * e 1, minus 1, d * q 1, sums 2           7     14 u D R E
+//! det        e 1, f 1, d * f 1, minus 1, e * p 1, sums 2           7     14 u D E^2
+//! W          those of U, V and det, and two of its own          2 + 2    28 u D R E + 18 u D E^2
 //! ```
 //!
-//! The own roundings of W act on values that are at most |det| <= 12 E^2 if the line meets the
+//! The own roundings of W act on values that are at most |det| <= 2 D E^2 if the line meets the
 //! triangle, which is the only case that matters.
 //!
 //! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the sheared plane: by
@@ -47,7 +47,7 @@
 //! anchor.
 //!
 //! ```text
-//! K         174 u                    174 for 168: higher orders, 32 * 7 * 2^-53, the roundings of M and of the error
+//! K         29 u D                   29 for 28: higher orders, 32 * 7 * 2^-53, the roundings of M, D and the error
 //! slack     32 times that of the approach
 //! floor     28 s^2 + 2^-120 (X + 1)  underflow: 18 R + 21 products, each off by 2^-126 at most,
 //!                                    denormal or flushed to zero
@@ -73,8 +73,8 @@ const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
 /// An upper bound of all underflow, for each unit of distance.
 const LEAST: f64 = f64::from_bits(0x3870_0000_0000_0000); // 2^-120
 
-/// K: the error for each unit of M and of E.
-const OF_REACH: f32 = 174.0 / 16_777_216.0;
+/// K for a direction whose components have this sum: the error for each unit of M and of E.
+const OF_SUM: f32 = 29.0 / 16_777_216.0;
 
 /// Growth of a bound that covers its own rounding, in f64 and to f32.
 const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
@@ -85,8 +85,6 @@ const NEARBY_FLOOR: f32 = 2e-29;
 const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
 /// [`LEAST`].
 const NEARBY_UNDERFLOW: f32 = f32::from_bits(0x0380_0000); // 2^-120
-/// A sixth, with room for roundings in f32.
-const NEARBY_SIXTH: f32 = 0.166_667;
 /// No corner is farther from the origin of a ray that starts near a box, in extents of the box: up to
 /// [`FAR_EXTENTS`] from its centre, and half an extent; the rest is room for roundings.
 const NEARBY_EXTENTS: f32 = FAR_EXTENTS + 1.0;
@@ -106,9 +104,6 @@ pub(crate) trait Lanes:
 
     /// Multiplies by a number and adds another; fused where the machine does both at once.
     fn times_plus(self, factor: Self, summand: Self) -> Self;
-
-    /// Multiplies by a constant and adds a number; fused likewise.
-    fn scaled_plus(self, factor: f32, summand: Self) -> Self;
 
     /// Multiplies by a number and subtracts another; fused likewise.
     fn times_minus(self, factor: Self, subtrahend: Self) -> Self;
@@ -131,11 +126,6 @@ impl Lanes for f32 {
 
     #[inline(always)]
     fn times_plus(self, factor: Self, summand: Self) -> Self {
-        self * factor + summand
-    }
-
-    #[inline(always)]
-    fn scaled_plus(self, factor: f32, summand: Self) -> Self {
         self * factor + summand
     }
 
@@ -170,11 +160,6 @@ impl<S: Simd> Lanes for f32x8<S> {
     }
 
     #[inline(always)]
-    fn scaled_plus(self, factor: f32, summand: Self) -> Self {
-        self.mul_add(Self::splat(self.simd, factor), summand)
-    }
-
-    #[inline(always)]
     fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
         self.mul_sub(factor, subtrahend)
     }
@@ -198,8 +183,9 @@ pub(crate) struct LineFilter<L> {
     pub(crate) origin: [L; 3],
     /// The direction, its largest component in [1, 2).
     pub(crate) direction: [L; 3],
-    /// The error for each unit of a triangle's longest edge component, beside what grows with its distance: 32 times
-    /// what the line may be off.
+    /// K: the error for each unit of a triangle's longest edge component and of its distance.
+    pub(crate) rate: L,
+    /// The error for each unit of that component at any distance: 32 times what the line may be off.
     pub(crate) slack: L,
     /// The error of a triangle of any size.
     pub(crate) floor: L,
@@ -209,8 +195,7 @@ pub(crate) struct LineFilter<L> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RayFilter {
     pub(crate) line: LineFilter<f32>,
-    /// M of any triangle, for tests of one triangle alone: there its own M would take longer than it saves. Times a
-    /// sixth of the sum of the direction's components, for which K takes 6.
+    /// M of any triangle, for tests of one triangle alone: there its own M would take longer than it saves.
     pub(crate) reach: f32,
 }
 
@@ -220,6 +205,7 @@ impl RayFilter {
         line: LineFilter {
             origin: [0.0; 3],
             direction: [0.0; 3],
+            rate: 0.0,
             slack: 0.0,
             floor: f32::INFINITY,
         },
@@ -241,9 +227,9 @@ impl RayFilter {
         let floor = 28.0 * off * off + (distance + 1.0) * LEAST;
         let floor = if distance <= MOST_REACH { round(floor * UP) } else { f32::INFINITY };
         let slack = round(32.0 * slack * UP);
-        let line = LineFilter { origin: anchor, direction: [x, y, z], slack, floor };
-        let sum = f64::from(x.abs()) + f64::from(y.abs()) + f64::from(z.abs());
-        Self { line, reach: round((distance + extent) * sum * (UP / 6.0)) }
+        let rate = rate(x.abs() + y.abs() + z.abs());
+        let line = LineFilter { origin: anchor, direction: [x, y, z], rate, slack, floor };
+        Self { line, reach: round(distance + extent) }
     }
 
     /// The filter of a ray that starts near a box of triangles, from whose origin no corner is farther than `distance`.
@@ -256,8 +242,11 @@ impl RayFilter {
         distance: f32,
         extent: f32,
     ) -> Self {
-        let line = LineFilter { origin, direction, slack: 0.0, floor: nearby_floor(extent) };
-        Self { line, reach: (distance + extent) * sum * NEARBY_SIXTH }
+        let (rate, floor) = (rate(sum), nearby_floor(extent));
+        Self {
+            line: LineFilter { origin, direction, rate, slack: 0.0, floor },
+            reach: distance + extent,
+        }
     }
 
     /// Returns true unless the triangle is dropped.
@@ -276,10 +265,17 @@ impl LineFilter<f32> {
         LineFilter {
             origin: [lanes(x), lanes(y), lanes(z)],
             direction: [lanes(u), lanes(v), lanes(w)],
+            rate: lanes(self.rate),
             slack: lanes(self.slack),
             floor: lanes(self.floor),
         }
     }
+}
+
+/// K of a direction: the sum of its components' magnitudes counts.
+#[inline(always)]
+pub(crate) fn rate(sum: f32) -> f32 {
+    sum * OF_SUM
 }
 
 /// The floor of rays that start near a box of this extent, computed in f32: that of [`RayFilter::new`], or a little
@@ -324,7 +320,7 @@ impl<L: Lanes> LineFilter<L> {
         let v = dot(d, q);
         let w = dot(e, p) - u - v;
 
-        let of_longest = size.reach.scaled_plus(OF_REACH, self.slack);
+        let of_longest = size.reach.times_plus(self.rate, self.slack);
         L::are_opposite([u, v, w], size.longest.times_plus(of_longest, self.floor))
     }
 }
@@ -414,6 +410,7 @@ mod tests {
             let all = LineFilter {
                 origin: core::array::from_fn(|axis| of(&|lane| rays[lane].origin[axis])),
                 direction: core::array::from_fn(|axis| of(&|lane| rays[lane].direction[axis])),
+                rate: of(&|lane| rays[lane].rate),
                 slack: of(&|lane| rays[lane].slack),
                 floor: of(&|lane| rays[lane].floor),
             };
@@ -576,7 +573,9 @@ mod tests {
                 let exact = RayFilter::new(direction, [0.0; 3], 0.0, reach);
                 let nearby = RayFilter::nearby([0.0; 3], direction, 3.4, distance, extent);
                 assert!(nearby.line.floor >= exact.line.floor, "{distance} {extent}");
-                assert!(nearby.reach >= exact.reach, "{distance} {extent}");
+                assert!(nearby.line.rate >= exact.line.rate, "{distance} {extent}");
+                // K has room for roundings of the reach.
+                assert!(nearby.reach >= exact.reach * 0.999_999, "{distance} {extent}");
             }
         }
     }

@@ -19,7 +19,7 @@ use crate::approach::FAR_EXTENTS;
 use crate::before;
 use crate::eight::columns;
 use crate::extremes::Extremes;
-use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter, Size, nearby_floor};
+use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter, Size, nearby_floor, rate};
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
 use crate::pairs;
@@ -50,8 +50,9 @@ pub(crate) struct Rays {
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
-    /// The filter's floor in that box.
+    /// The filter's floor in that box, and the largest rate of a ray.
     floor: f32,
+    rate: f32,
     /// The point that boxes and origins are relative to: the origin of the first ray that was ready. It stays the same
     /// when that ray ends.
     pub(crate) center: [f32; 3],
@@ -126,6 +127,7 @@ impl Rays {
         let near = if extent < MOST_EXTENT { FAR_EXTENTS * extent } else { -1.0 };
         let near = f32x8::splat(simd, near);
         let zero = f32x8::splat(simd, 0.0);
+        let mut sum = zero;
         let finite = f32x8::splat(simd, f32::INFINITY);
         self.hits = [Hit::MISS; GROUP];
         self.pair_count = 0;
@@ -154,7 +156,8 @@ impl Rays {
                 & longest.simd_lt(f32x8::splat(simd, NEARBY_LONG));
             let of_count = bits_below(count - 8 * octet);
             let valid = u64::from(bits(is_valid)) & of_count;
-            let ready = u64::from(bits(is_valid & is_near)) & of_count;
+            let is_ready = is_valid & is_near;
+            let ready = u64::from(bits(is_ready)) & of_count;
             alive |= ready << (8 * octet);
             special |= (valid & !ready) << (8 * octet);
 
@@ -163,6 +166,8 @@ impl Rays {
             let scale = exponent.bitcast::<f32x8<S>>();
             let inverse_scale = (u32x8::splat(simd, 0x7f00_0000) - exponent).bitcast::<f32x8<S>>();
             let scaled = [x * inverse_scale, y * inverse_scale, z * inverse_scale];
+            let [a, b, c] = scaled;
+            sum = sum.greater(is_ready.select(a.abs() + b.abs() + c.abs(), zero));
             let steep = f32x8::splat(simd, STEEP);
             for axis in 0..3 {
                 let direction = scaled[axis];
@@ -182,6 +187,7 @@ impl Rays {
             self.scale[octet] = scale.into();
             self.given_start[octet] = (t_min * scale).into();
         }
+        self.rate = rate(sum.reduce_max());
         self.alive = alive;
         self.settle(simd);
         let [x, y, z] = self.origins;
@@ -298,6 +304,7 @@ impl Rays {
         LineFilter {
             origin: splat(simd, self.given[ray as usize % GROUP].origin),
             direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
+            rate: f32x8::splat(simd, self.rate),
             slack: f32x8::splat(simd, 0.0),
             floor: f32x8::splat(simd, self.floor),
         }
@@ -315,6 +322,7 @@ impl Rays {
         LineFilter {
             origin: octet_of(simd, &self.anchor, octet),
             direction: octet_of(simd, &self.direction, octet),
+            rate: f32x8::splat(simd, self.rate),
             slack: f32x8::splat(simd, 0.0),
             floor: f32x8::splat(simd, self.floor),
         }
