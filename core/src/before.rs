@@ -24,15 +24,16 @@
 //! N          those of T and of s det, a product 1, a difference 1                       54 u G E^2 + 108 u |s| E^2
 //! ```
 //!
-//! The f64 test moves the corners by at most m = 7 * 2^-53 M on each of the two axes across the ray; M is G + E, as in
-//! the filter. Depths stay what they are. If no corner lies before the start, neither does the point
+//! The f64 test moves the corners by at most m on each of the two axes across the ray: 7 * 2^-53 of the distance of the
+//! farthest corner, which is no more than the filter's M = G + E, nor than its X. Depths stay what they are. If no
+//! corner lies before the start, neither does the point
 //! where the ray meets the moved triangle: N / det of that is not negative. Else the test decides exactly, on the
 //! triangle as it is. The move changes T by at most 24 m E (G + E) and det by at most 32 m E; the second order in m is
 //! below 28 m^2 (G + E) and 16 m^2.
 //!
 //! ```text
-//! error    E (56 u E + 2^-45 M) + floor       2^-45 is more than 32 * 7 * 2^-53, so the second term covers the
-//!                                             changes; floor is at least 28 m^2 + 2^-120
+//! error    E (56 u E + 2^-45 M) + floor       2^-45 is more than 32 * 7 * 2^-53, so the second term covers the first
+//!                                             order in m; floor is at least 28 m^2 + 2^-120, as it grows with X
 //! bound    error (M + 2 |s|) + 2^-120         floor and 2^-120 cover what underflows
 //! |det| must exceed 1.6 error: more than 84 u E^2 and its change, so that no move turns the triangle round
 //! ```
@@ -49,7 +50,7 @@ const MOST_EXTENT: f32 = 262_144.0 * 1_048_576.0; // 2^38
 
 /// 56 * 2^-24.
 const UNITS: f32 = 56.0 / 16_777_216.0;
-/// What moves the corners, in parts of their distance: 2^-45.
+/// 32 times what moves the corners, in parts of M, and a little more: 2^-45.
 const OF_REACH: f32 = 1.0 / (32.0 * 1_048_576.0 * 1_048_576.0);
 /// More than what underflows: 2^-120.
 const LEAST: f32 = f32::from_bits(0x0380_0000);

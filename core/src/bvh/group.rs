@@ -171,6 +171,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
         let mut met = Met::NONE;
         let is_large = HAS_PREFETCH && bvh.exceeds(CORE_CACHES);
         let beam = rays.beam(simd);
+        rays.notice_camera(&beam);
         let (mut child, mut mask) = (Child::Inner(0), rays.alive);
         loop {
             if !budget.take(1) {
@@ -249,13 +250,19 @@ fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiti
 #[cfg(test)]
 mod tests {
     use alloc::vec;
+    use alloc::vec::Vec;
 
+    use fearless_simd::f32x8;
+    use fearless_simd::prelude::*;
     use glam::Vec3A;
 
     use super::super::node::Node;
     use super::*;
+    use crate::approach::Reach;
+    use crate::filter::{RayFilter, Size, splat};
     use crate::options::Choice;
     use crate::ray::Ray;
+    use crate::samples::Random;
     use crate::simd::dispatch;
 
     /// Prepares rays of which the last starts elsewhere than the others.
@@ -293,6 +300,52 @@ mod tests {
             assert_eq!(dispatch(SimdLevel::detect(), Prepared(&mut rays, apart)), 0);
             assert_eq!(rays.alive, u64::MAX);
             assert_eq!(wait_for_memory(&rays, &bvh), waits, "{count} nodes, {apart} apart");
+        }
+    }
+
+    /// Prepares rays of all directions that start up to so far apart, and compares their sizes of triangles and their
+    /// filters with those of each ray alone.
+    struct Sizes<'a>(&'a mut Random, f32);
+
+    impl Kernel for Sizes<'_> {
+        type Output = ();
+
+        fn run<S: Simd>(self, simd: S) {
+            let Self(random, apart) = self;
+            let mut rays = Rays::new(Choice::ALL);
+            for ray in rays.slots() {
+                *ray = Ray::new(random.point().map(|x| x * apart), random.point());
+            }
+            let given: Vec<Ray> = rays.slots().to_vec();
+            let bounds = Aabb { min: Vec3A::splat(-1.0), max: Vec3A::splat(1.0) };
+            rays.prepare(simd, GROUP, &bounds);
+            for (lane, ray) in (0..).zip(&given).filter(|(lane, _)| rays.alive >> lane & 1 == 1) {
+                let alone =
+                    RayFilter::new(ray.direction, ray.origin, 0.0, Reach::of(&bounds, ray.origin));
+                let filter = rays.filter(simd, lane);
+                let first = |numbers: f32x8<S>| <[f32; 8]>::from(numbers)[0];
+                assert!(
+                    first(filter.rate) >= alone.line.rate
+                        && first(filter.floor) >= alone.line.floor
+                );
+                let triangle = [random.point(), random.point(), random.point()];
+                let corners = splat(simd, &triangle);
+                let own = first(Size::new(filter.origin, &corners).reach);
+                let of_one = first(rays.size_of(simd, &corners, 1 << lane).reach);
+                assert_eq!(of_one.to_bits(), own.to_bits());
+                // It may be rounded: the filter has room for that.
+                assert!(first(rays.size_of(simd, &corners, u64::MAX).reach) >= own * 0.999_999);
+            }
+        }
+    }
+
+    #[test]
+    fn a_group_filters_no_tighter_than_its_rays_alone() {
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        for apart in [0.0, 1e-3, 1.0, 8.0] {
+            for _ in 0..if cfg!(miri) { 1 } else { 200 } {
+                dispatch(SimdLevel::detect(), Sizes(&mut random, apart));
+            }
         }
     }
 }

@@ -92,7 +92,7 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
             for &id in ids {
                 let Some(triangle) = mesh.triangle(id) else { continue };
                 let corners = crate::filter::splat(simd, &triangle);
-                let size = rays.size_of(simd, &corners);
+                let size = rays.size_of(simd, &corners, mask);
                 for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
                     let of_octet = mask >> (8 * octet) & 0xff;
                     if of_octet == 0 {
@@ -128,7 +128,7 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
 ) {
     let Leaf { bvh, mesh, first, ids, .. } = *leaf;
     let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
-    let size = rays.size_of(simd, &triangles.corners);
+    let size = rays.size_of(simd, &triangles.corners, mask);
     let mut rest = mask;
     while rest != 0 {
         let ray = rest.trailing_zeros();

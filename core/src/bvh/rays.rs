@@ -45,8 +45,7 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
-    /// True if some origins lie inside the box, so that their rays may leave one of its triangles. False if all rays
-    /// start at one point, as those of a camera.
+    /// True if some origins lie inside the box, so that their rays may leave one of its triangles.
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
@@ -56,9 +55,9 @@ pub(crate) struct Rays {
     /// The point that boxes and origins are relative to: the origin of the first ray that was ready. It stays the same
     /// when that ray ends.
     pub(crate) center: [f32; 3],
-    /// The largest coordinate of an origin relative to `center`.
+    /// The largest magnitude of a coordinate of an origin relative to `center`.
     farthest: f32,
-    /// The growth of boxes that covers eight roundings of that and `origin_error`.
+    /// The growth of boxes: eight roundings of `farthest`, and `origin_error`.
     pub(crate) growth: f32,
     inverse: [PerRay; 3],
     /// Minus the origin, relative to the centre, times the inverse direction.
@@ -194,7 +193,7 @@ impl Rays {
         let center = Vec3A::from(self.center);
         let (low, high) = (Vec3A::new(x[0], y[0], z[0]), Vec3A::new(x[1], y[1], z[1]));
         let origins = Aabb { min: center + low, max: center + high };
-        self.may_leave = self.farthest > 0.0 && before::pays(bounds, &origins);
+        self.may_leave = before::pays(bounds, &origins);
         special
     }
 
@@ -290,11 +289,25 @@ impl Rays {
         }
     }
 
-    /// The sizes of triangles as seen from all origins.
+    /// The sizes of triangles as seen by a ray, or no less than as seen by any of the group if there are more.
     #[inline(always)]
-    pub(crate) fn size_of<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> Size<f32x8<S>> {
-        let Size { longest, reach } = Size::new(splat(simd, self.center), corners);
-        Size { longest, reach: reach + self.farthest }
+    pub(crate) fn size_of<S: Simd>(
+        &self,
+        simd: S,
+        corners: &[[f32x8<S>; 3]; 3],
+        rays: u64,
+    ) -> Size<f32x8<S>> {
+        let one = self.given[rays.trailing_zeros() as usize % GROUP].origin;
+        let is_one = rays & rays.wrapping_sub(1) == 0;
+        let (origin, farthest) = if is_one { (one, 0.0) } else { (self.center, self.farthest) };
+        let Size { longest, reach } = Size::new(splat(simd, origin), corners);
+        Size { longest, reach: reach + farthest }
+    }
+
+    /// Notices the rays of a camera: they start at one point and run side by side, and leave no surface.
+    #[inline(always)]
+    pub(crate) fn notice_camera<S: Simd>(&mut self, beam: &Beam<S>) {
+        self.may_leave &= self.farthest > 0.0 || beam.is_bounded != [true; 3];
     }
 
     /// The filter of one ray in all lanes.
