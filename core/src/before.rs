@@ -26,10 +26,9 @@
 //!
 //! The f64 test moves the corners by at most m on each of the two axes across the ray: 7 * 2^-53 of the distance of the
 //! farthest corner, which is no more than the filter's M = G + E, nor than its X. Depths stay what they are. If no
-//! corner lies before the start, neither does the point
-//! where the ray meets the moved triangle: N / det of that is not negative. Else the test decides exactly, on the
-//! triangle as it is. The move changes T by at most 24 m E (G + E) and det by at most 32 m E; the second order in m is
-//! below 28 m^2 (G + E) and 16 m^2.
+//! corner lies before the start, neither does the point where the ray meets the moved triangle: N / det of that is not
+//! negative. Else the test decides exactly, on the triangle as it is. The move changes T by at most 24 m E (G + E) and
+//! det by at most 32 m E; the second order in m is below 28 m^2 (G + E) and 16 m^2.
 //!
 //! ```text
 //! error    E (56 u E + 2^-45 M) + floor       2^-45 is more than 32 * 7 * 2^-53, so the second term covers the first
