@@ -282,34 +282,37 @@ mod tests {
         [[end, last], [first, end], [end, t + 1.0], [0.0, end]][random.below(4)]
     }
 
-    /// Decides eight pairs at each level, checks those that are sure, and adds up the hits and the unsure lanes.
-    fn check(rays: &[Ray; LANES], triangles: &[Triangle; LANES]) -> [u32; 2] {
+    /// Makes eight pairs in each round and decides them at each level. Checks those that are sure, and adds up the hits
+    /// and the unsure lanes.
+    fn check(
+        rounds: u32,
+        mut make: impl FnMut() -> ([Ray; LANES], [Triangle; LANES]),
+    ) -> (u32, u32) {
+        let rounds = if cfg!(miri) { 20 } else { rounds };
         let indices: Vec<[u32; 3]> = (0..8).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
-        let mesh = TriangleMesh::new(triangles.as_flattened(), &indices).unwrap();
         let (mut hits, mut unsure) = (0, 0);
-        for level in SimdLevel::available() {
-            let decided = dispatch(level, Lanes(rays, &mesh));
-            for (lane, (ray, triangle)) in rays.iter().zip(triangles).enumerate() {
-                let is = |bits: u32| bits >> lane & 1 == 1;
-                // A group holds valid rays alone.
-                if !ray.is_valid() {
-                    continue;
+        for (rays, triangles) in (0..rounds).map(|_| make()) {
+            let mesh = TriangleMesh::new(triangles.as_flattened(), &indices).unwrap();
+            for level in SimdLevel::available() {
+                let decided = dispatch(level, Lanes(&rays, &mesh));
+                for (lane, (ray, triangle)) in rays.iter().zip(&triangles).enumerate() {
+                    let is = |bits: u32| bits >> lane & 1 == 1;
+                    // A group holds valid rays alone.
+                    if !ray.is_valid() {
+                        continue;
+                    }
+                    if is(decided.unsure) {
+                        unsure += 1;
+                        continue;
+                    }
+                    let hit = decided.hit(lane, 0);
+                    let found = is(decided.hits).then(|| [hit.t, hit.u, hit.v].map(f32::to_bits));
+                    assert_eq!(found, alone(ray, triangle), "{level:?} {ray:?} {triangle:?}");
+                    hits += u32::from(found.is_some());
                 }
-                if is(decided.unsure) {
-                    unsure += 1;
-                    continue;
-                }
-                let hit = decided.hit(lane, 0);
-                let found = is(decided.hits).then(|| [hit.t, hit.u, hit.v].map(f32::to_bits));
-                assert_eq!(found, alone(ray, triangle), "{level:?} {ray:?} {triangle:?}");
-                hits += u32::from(found.is_some());
             }
         }
-        [hits, unsure]
-    }
-
-    fn add([a, b]: [u32; 2], [c, d]: [u32; 2]) -> [u32; 2] {
-        [a + c, b + d]
+        (hits, unsure)
     }
 
     /// The margins are larger than any error that turns up here: only the proof bounds them.
@@ -319,9 +322,7 @@ mod tests {
             return;
         }
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
-        let rounds = if cfg!(miri) { 20 } else { 30_000 };
-        let mut sum = [0, 0];
-        for _ in 0..rounds {
+        let (hits, unsure) = check(30_000, || {
             // Near the origin or far from it, tiny or huge.
             let shift = [0.0, 0.0, 100.0, 1e5][random.below(4)];
             let scale = [1.0, 1.0, 1e-20, 1e15][random.below(4)];
@@ -338,9 +339,8 @@ mod tests {
                 let [t_min, t_max] = range(&mut random, met.map_or(1.0, |met| met.t));
                 Ray { t_min, t_max, ..whole }
             });
-            sum = add(sum, check(&rays, &triangles));
-        }
-        let [hits, unsure] = sum;
+            (rays, triangles)
+        });
         assert!(cfg!(miri) || (hits > 10_000 && unsure > 10_000), "{hits} {unsure}");
     }
 
@@ -351,9 +351,7 @@ mod tests {
             return;
         }
         let mut random = Random(0x2545_f491_4f6c_dd1d);
-        let rounds = if cfg!(miri) { 20 } else { 2000 };
-        let mut sum = [0, 0];
-        for _ in 0..rounds {
+        let (hits, unsure) = check(2000, || {
             let triangles: [Triangle; LANES] =
                 core::array::from_fn(|_| [random.point(), random.point(), random.point()]);
             let rays = triangles.map(|[a, b, c]| {
@@ -361,9 +359,8 @@ mod tests {
                 let direction = random.point();
                 Ray::new(along(target, direction, -0.2), direction)
             });
-            sum = add(sum, check(&rays, &triangles));
-        }
-        let [hits, unsure] = sum;
+            (rays, triangles)
+        });
         assert!(unsure < hits / 50, "{hits} {unsure}");
     }
 }

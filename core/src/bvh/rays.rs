@@ -45,7 +45,8 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, as a length: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
-    /// True if some origins lie inside the box, so that their rays may leave one of its triangles.
+    /// True if some origins lie inside the box, so that their rays may leave one of its triangles, and if the rays are
+    /// not those of a camera.
     pub(super) may_leave: bool,
     /// The extent of the box that the rays were prepared for.
     extent: f32,
