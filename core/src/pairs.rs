@@ -36,6 +36,7 @@ use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8};
 
 use crate::eight::{Eight, LANES, columns};
 use crate::mesh::TriangleMesh;
+use crate::options::Cull;
 use crate::ray::{Hit, Ray};
 use crate::triangle::{OUTSIDE, SMALL};
 
@@ -47,17 +48,28 @@ const CLEAR: f64 = 1.0 / (65_536.0 * 1_048_576.0);
 /// The decisions on eight pairs.
 pub(crate) struct Decided {
     /// Lanes with a hit, as bits.
-    pub(crate) hits: u32,
+    hits: u32,
     /// Lanes that have to be decided alone.
     pub(crate) unsure: u32,
     /// Lanes whose ray comes from the triangle's front; without meaning where there is no hit.
-    pub(crate) fronts: u32,
-    t: [f32; LANES],
+    fronts: u32,
+    /// The `t` of each hit; any number in other lanes.
+    pub(crate) t: [f32; LANES],
     u: [f32; LANES],
     v: [f32; LANES],
 }
 
 impl Decided {
+    /// The lanes with a hit on a side of the triangle that is not culled.
+    #[inline(always)]
+    pub(crate) const fn seen(&self, cull: Cull) -> u32 {
+        match cull {
+            Cull::None => self.hits,
+            Cull::Back => self.hits & self.fronts,
+            Cull::Front => self.hits & !self.fronts,
+        }
+    }
+
     /// The hit of a lane that has one.
     #[inline(always)]
     pub(crate) fn hit(&self, lane: usize, primitive: u32) -> Hit {
@@ -66,7 +78,16 @@ impl Decided {
     }
 }
 
-/// Decides the first `count` of eight pairs; the others are read, too.
+/// The triangles of eight pairs.
+#[derive(Clone, Copy)]
+pub(crate) enum Triangles {
+    /// One a pair. So many of the first pairs matter; the others are read, too.
+    Each([u32; LANES], usize),
+    /// One for all. The pairs that matter, as bits.
+    One(u32, u32),
+}
+
+/// Decides up to eight pairs.
 ///
 /// `vectorize` makes the test a function of its own, compiled for the same instructions. A group decides in three
 /// places, so the compiler calls it there instead of writing it out three times.
@@ -75,12 +96,11 @@ pub(crate) fn decide<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     rays: [&Ray; LANES],
-    ids: [u32; LANES],
-    count: usize,
+    triangles: Triangles,
 ) -> Decided {
     simd.vectorize(
         #[inline(always)]
-        || decide_in_line(simd, mesh, rays, ids, count),
+        || decide_in_line(simd, mesh, rays, triangles),
     )
 }
 
@@ -89,10 +109,12 @@ fn decide_in_line<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     rays: [&Ray; LANES],
-    ids: [u32; LANES],
-    count: usize,
+    triangles: Triangles,
 ) -> Decided {
-    let triangles = Eight::of(simd, mesh, ids, count);
+    let (triangles, wanted) = match triangles {
+        Triangles::Each(ids, count) => (Eight::of(simd, mesh, ids, count), 0xff),
+        Triangles::One(id, wanted) => (Eight::one(simd, mesh, id), wanted),
+    };
     let (origin, t_min, direction, t_max) = columns(simd, rays);
 
     // Turn each lane so that its direction is longest along z.
@@ -139,11 +161,10 @@ fn decide_in_line<S: Simd>(
         & along.simd_ge(from - outside)
         & along.simd_le(to + outside);
 
-    let of_count = (1_u32 << count.min(LANES)) - 1;
-    let of_count = of_count & triangles.used;
+    let wanted = wanted & triangles.used;
     let candidates = is_inside & (is_small | (has_area & is_close));
     let mut sure = !is_small & is_between;
-    if bits(candidates & !sure) & of_count != 0 {
+    if bits(candidates & !sure) & wanted != 0 {
         // Some triangles reach beyond an end. Their hits may lie clearly inside.
         let deepest = first.abs().max(last.abs());
         let width = widest(a).max(widest(b)).max(widest(c)) + deepest;
@@ -154,8 +175,8 @@ fn decide_in_line<S: Simd>(
         sure |= !is_small & is_wide & is_clear;
     }
     Decided {
-        hits: bits(candidates & sure) & of_count,
-        unsure: bits(candidates & !sure) & of_count,
+        hits: bits(candidates & sure) & wanted,
+        unsure: bits(candidates & !sure) & wanted,
         fronts: !(bits(area.simd_gt(zero)) ^ bits(is_forward)),
         t: (rounded(depth / dz).max(t_min).min(t_max) + 0.0).into(),
         u: rounded(weights[1]).into(),
@@ -252,18 +273,19 @@ mod tests {
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
     use crate::triangle::TriangleTest;
 
-    /// Eight rays, each with the triangle of its lane.
+    /// Eight rays, each with the triangle of its lane; then all with the first triangle.
     #[derive(Clone, Copy)]
     struct Lanes<'a>(&'a [Ray; LANES], &'a TriangleMesh<'a>);
 
     impl Kernel for Lanes<'_> {
-        type Output = Decided;
+        type Output = [Decided; 2];
         const IS_WIDE: bool = true;
 
         #[inline(always)]
-        fn run<S: Simd>(self, simd: S) -> Decided {
+        fn run<S: Simd>(self, simd: S) -> [Decided; 2] {
             let Self(rays, mesh) = self;
-            decide(simd, mesh, rays.each_ref(), [0, 1, 2, 3, 4, 5, 6, 7], LANES)
+            [Triangles::Each([0, 1, 2, 3, 4, 5, 6, 7], LANES), Triangles::One(0, 0xff)]
+                .map(|triangles| decide(simd, mesh, rays.each_ref(), triangles))
         }
     }
 
@@ -282,8 +304,8 @@ mod tests {
         [[end, last], [first, end], [end, t + 1.0], [0.0, end]][random.below(4)]
     }
 
-    /// Makes eight pairs in each round and decides them at each level. Checks those that are sure, and adds up the hits
-    /// and the unsure lanes.
+    /// Makes eight pairs in each round and decides them at each level, and the eight rays with the first triangle. Checks
+    /// those that are sure, and adds up the hits and the unsure lanes.
     fn check(
         rounds: u32,
         mut make: impl FnMut() -> ([Ray; LANES], [Triangle; LANES]),
@@ -294,8 +316,10 @@ mod tests {
         for (rays, triangles) in (0..rounds).map(|_| make()) {
             let mesh = TriangleMesh::new(triangles.as_flattened(), &indices).unwrap();
             for level in SimdLevel::available() {
-                let decided = dispatch(level, Lanes(&rays, &mesh));
-                for (lane, (ray, triangle)) in rays.iter().zip(&triangles).enumerate() {
+                let [each, first] = dispatch(level, Lanes(&rays, &mesh));
+                let all = |decided, one| (0..LANES).map(move |lane| (decided, lane, lane * one));
+                for (decided, lane, at) in all(&each, 1).chain(all(&first, 0)) {
+                    let (ray, triangle) = (&rays[lane], &triangles[at]);
                     let is = |bits: u32| bits >> lane & 1 == 1;
                     // A group holds valid rays alone.
                     if !ray.is_valid() {

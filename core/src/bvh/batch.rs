@@ -9,7 +9,8 @@
 use super::Bvh;
 use super::group::{Group, Together};
 use super::order::{self, SortKey, Sorted};
-use super::rays::{GROUP, Rays};
+use super::per_ray::GROUP;
+use super::rays::Rays;
 use super::stack::GroupStack;
 use crate::aabb::Aabb;
 use crate::filter::RayFilter;

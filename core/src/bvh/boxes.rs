@@ -53,6 +53,7 @@ pub(crate) struct Slabs<V> {
 /// inverse directions are unbounded.
 #[derive(Clone, Copy)]
 pub(crate) struct Beam<S: Simd> {
+    /// The ends of the interval. On a bounded axis, rays from the first one reach a side first.
     pub(crate) origin: [[f32x8<S>; 2]; 3],
     pub(crate) inverse: [[f32x8<S>; 2]; 3],
     pub(crate) is_bounded: [bool; 3],
@@ -142,20 +143,17 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
                 all_in = f32x8::splat(simd, f32::INFINITY);
                 continue;
             }
-            let [first, last] = beam.origin[axis];
+            let [early, late] = beam.origin[axis];
             let [least, most] = beam.inverse[axis];
             let (low, high) = (self.low[axis], self.high[axis]);
-            let is_positive = beam.is_positive[axis];
-            let (near, far) = if is_positive { (low, high) } else { (high, low) };
-            // The distance to a side is extreme at the extremes of origin and direction.
-            let (a, b) = ((near - first) * least, (near - first) * most);
-            let (c, d) = ((near - last) * least, (near - last) * most);
-            enter = enter.greater(a.lesser(b).lesser(c.lesser(d)));
-            all_in = all_in.greater(a.greater(b).greater(c.greater(d)));
-            let (a, b) = ((far - first) * least, (far - first) * most);
-            let (c, d) = ((far - last) * least, (far - last) * most);
-            leave = leave.lesser(a.greater(b).greater(c.greater(d)));
-            first_out = first_out.lesser(a.lesser(b).lesser(c.lesser(d)));
+            let (near, far) = if beam.is_positive[axis] { (low, high) } else { (high, low) };
+            // A distance is least for the origin that is early, and greatest for the late one.
+            let (a, b) = ((near - early) * least, (near - early) * most);
+            let (c, d) = ((near - late) * least, (near - late) * most);
+            (enter, all_in) = (enter.greater(a.lesser(b)), all_in.greater(c.greater(d)));
+            let (a, b) = ((far - early) * least, (far - early) * most);
+            let (c, d) = ((far - late) * least, (far - late) * most);
+            (first_out, leave) = (first_out.lesser(a.lesser(b)), leave.lesser(c.greater(d)));
         }
         let leave = (leave * f32x8::splat(simd, WIDER)).lesser(beam.end);
         BeamMet { some: bits(!enter.simd_gt(leave)), all: bits(all_in.simd_lt(first_out)), enter }

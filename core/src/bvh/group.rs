@@ -24,7 +24,8 @@ use super::group_leaf::{BoxLeaves, Leaf, Leaves, Offer, Scattered, TriangleLeave
 use super::interleave;
 use super::met::Met;
 use super::node::{Child, WIDTH};
-use super::rays::{GROUP, Rays};
+use super::per_ray::GROUP;
+use super::rays::Rays;
 use super::stack::{GroupEntry, GroupStack};
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
@@ -146,7 +147,7 @@ impl<L: Leaves> Kernel for Descent<'_, '_, L> {
         let Group { bvh, mesh, bounds, rays, stack, count, until } = &mut *self.group;
         let alone = rays.prepare(simd, *count, bounds);
         if let Some(until) = until {
-            rays.take_until(until);
+            rays.take_until(simd, until);
         }
         match self.leaves.scattered() {
             Scattered::Interleaved if wait_for_memory(rays, bvh) => {

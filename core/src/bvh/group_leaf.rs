@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! triangles   filter them, all at once for each ray or eight rays at a time for each triangle;
-//!             decide what passes in f64, eight pairs of a ray and a triangle at a time
+//!             decide what passes in f64: eight rays with a triangle if many of them pass its filter,
+//!             else eight pairs of a ray and a triangle
 //! boxes       intersect them as the boxes of a node; offer each that rays meet, the nearest first
 //! ```
 
@@ -11,12 +12,16 @@ use fearless_simd::Simd;
 use super::Bvh;
 use super::boxes::{Beam, WideBoxes, bits};
 use super::met::{Met, octets};
-use super::rays::{OCTETS, Rays};
+use super::per_ray::OCTETS;
+use super::rays::Rays;
 use super::shape_leaf::{nearest_of, pad_of};
 use crate::aabb::Aabb;
 use crate::eight::Eight;
 use crate::mesh::TriangleMesh;
 use crate::simd::HAS_PREFETCH;
+
+/// If so many of eight rays pass the filter of a triangle, they are decided at once.
+const MANY: u32 = 4;
 
 /// A leaf that some rays of a group enter.
 pub(super) struct Leaf<'r> {
@@ -89,12 +94,13 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
             filter_for_each::<S, ANY>(simd, leaf, rays, mask);
         } else {
             // Many rays: filter each triangle for eight rays at a time.
+            let octets = mask.to_le_bytes();
             for &id in ids {
                 let Some(triangle) = mesh.triangle(id) else { continue };
                 let corners = crate::filter::splat(simd, &triangle);
                 let size = rays.size_of(simd, &corners, mask);
                 for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
-                    let of_octet = mask >> (8 * octet) & 0xff;
+                    let of_octet = u32::from(octets[octet]);
                     if of_octet == 0 {
                         continue;
                     }
@@ -104,7 +110,11 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
                         let start = rays.starts_of(simd, octet);
                         dropped |= filter.passes_before(simd, &corners, &size, start);
                     }
-                    let mut survivors = of_octet & !u64::from(bits(dropped));
+                    let mut survivors = of_octet & !bits(dropped);
+                    if survivors.count_ones() >= MANY {
+                        rays.decide_octet::<S, ANY>(simd, mesh, first, survivors, id);
+                        continue;
+                    }
                     while survivors != 0 {
                         let ray = first + survivors.trailing_zeros();
                         survivors &= survivors - 1;

@@ -12,7 +12,8 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
 use super::boxes::{Beam, WideBoxes, bits};
 use super::node::WIDTH;
-use super::rays::{GROUP, Rays};
+use super::per_ray::GROUP;
+use super::rays::Rays;
 use crate::extremes::Extremes;
 
 // Masks of rays are 64 bits, and `one_by_one` takes them in two halves.

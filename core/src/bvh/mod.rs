@@ -20,7 +20,7 @@
 //! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`;
 //!                parts (cut) for top and high/
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
-//! batches        batch: order, rays, group (boxes, met, group_leaf), interleave
+//! batches        batch: order, rays (per_ray), group (boxes, met, group_leaf), interleave
 //! points         nearest
 //! moved meshes   refit
 //! ```
@@ -60,6 +60,7 @@ mod nearest;
 mod node;
 mod order;
 mod parts;
+mod per_ray;
 mod rays;
 mod refit;
 mod roots;
@@ -89,7 +90,8 @@ pub(crate) use group::{Group, Together};
 pub(crate) use layout::LEVELS;
 use node::{LEAF, Node};
 pub(crate) use order::SortKey;
-pub(crate) use rays::{GROUP, Rays, lanes};
+pub(crate) use per_ray::GROUP;
+pub(crate) use rays::{Rays, lanes};
 pub(crate) use refit::refit;
 pub(crate) use search::Scope;
 pub(crate) use stack::GroupStack;

@@ -11,7 +11,7 @@
 //! sorted, nor are too few rays for groups to share anything: there sorting costs more than it gains.
 
 use super::group::Together;
-use super::rays::GROUP;
+use super::per_ray::GROUP;
 use crate::aabb::Aabb;
 use crate::ray::Ray;
 

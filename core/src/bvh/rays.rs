@@ -4,16 +4,17 @@
 //! prepare     find the rays that can hit; scale directions; bound the filter's error
 //! beam        the interval of all origins and inverse directions
 //! candidate   collect pairs of a ray and a triangle that passed the filter
-//! decide      test eight pairs in f64; keep the closest hit of each ray, or end the ray
+//! decide      test eight pairs, or eight rays with a triangle, in f64; keep the closest hit of each ray, or end it
 //! ```
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use glam::Vec3A;
-use zerocopy::{FromZeros, transmute_mut, transmute_ref};
+use zerocopy::{FromZeros, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
-use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
+use super::per_ray::{GROUP, OCTETS, PerRay, get, interval, octet_of, put, sixteen};
+use super::slab::{EARLIER, STEEP, TINY, WIDER, end_behind, ends_behind};
 use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::before;
@@ -21,18 +22,10 @@ use crate::eight::columns;
 use crate::extremes::Extremes;
 use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter, Size, nearby_floor, rate};
 use crate::mesh::TriangleMesh;
-use crate::options::{Choice, Cull};
-use crate::pairs;
+use crate::options::Choice;
+use crate::pairs::{self, Triangles};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::triangle::TriangleTest;
-
-/// Rays of a group, at most.
-pub(crate) const GROUP: usize = 64;
-/// Vectors of eight rays.
-pub(crate) const OCTETS: usize = GROUP / 8;
-
-/// A number of each ray.
-type PerRay = [[f32; 8]; OCTETS];
 
 /// Rays that go down together.
 #[derive(FromZeros)]
@@ -247,6 +240,11 @@ impl Rays {
         let [d, e, f] = &self.inverse;
         let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
         let [x, y, z] = inverses;
+        let is_positive = inverses.map(|[low, _]| low > 0.0);
+        let order = |[low, high]: [f32; 2], axis: usize| {
+            if is_positive[axis] { [high, low] } else { [low, high] }
+        };
+        let (a, b, c) = (order(a, 0), order(b, 1), order(c, 2));
         let first = f32x8::splat(simd, get(&self.start, self.alive.trailing_zeros()));
         let (mut start, mut end) = (first, first);
         for octet in 0..OCTETS {
@@ -260,7 +258,7 @@ impl Rays {
             origin: [ends(simd, a), ends(simd, b), ends(simd, c)],
             inverse: [ends(simd, x), ends(simd, y), ends(simd, z)],
             is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
-            is_positive: inverses.map(|[low, _]| low > 0.0),
+            is_positive,
             start: f32x8::splat(simd, start.reduce_min()),
             end: f32x8::splat(simd, end.reduce_max()),
         }
@@ -413,22 +411,53 @@ impl Rays {
         let (of, ids) = (self.pair_places, self.pair_ids);
         let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
-        let decided = pairs::decide(simd, mesh, rays, ids, count);
-        let mut hits = match self.choice.cull {
-            Cull::None => decided.hits,
-            Cull::Back => decided.hits & decided.fronts,
-            Cull::Front => decided.hits & !decided.fronts,
-        };
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize % PAIRS;
-            hits &= hits - 1;
-            self.found::<ANY>(mesh, of[lane], decided.hit(lane, ids[lane]));
+        let decided = pairs::decide(simd, mesh, rays, Triangles::Each(ids, count));
+        for lane in lanes(decided.seen(self.choice.cull).into()) {
+            let at = lane as usize % PAIRS;
+            self.found::<ANY>(mesh, of[at], decided.hit(at, ids[at]));
         }
-        let mut unsure = decided.unsure;
-        while unsure != 0 {
-            let lane = unsure.trailing_zeros() as usize % PAIRS;
-            unsure &= unsure - 1;
-            self.decide_one::<ANY>(mesh, of[lane], ids[lane]);
+        for lane in lanes(decided.unsure.into()) {
+            let at = lane as usize % PAIRS;
+            self.decide_one::<ANY>(mesh, of[at], ids[at]);
+        }
+    }
+
+    /// Decides a triangle for those of eight rays that passed its filter, as bits; `first` is the first of the eight.
+    #[inline(always)]
+    pub(crate) fn decide_octet<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        first: u32,
+        passed: u32,
+        id: u32,
+    ) {
+        if !self.choice.has(mesh, id) {
+            return;
+        }
+        let octet = first as usize / 8 % OCTETS;
+        let rays = &self.given.as_chunks::<8>().0[octet];
+        let decided = pairs::decide(simd, mesh, rays.each_ref(), Triangles::One(id, passed));
+        let mut closer = 0;
+        for lane in lanes(decided.seen(self.choice.cull).into()) {
+            let hit = decided.hit(lane as usize, id);
+            let best = &mut self.hits[(first + lane) as usize % GROUP];
+            if ANY {
+                self.found::<ANY>(mesh, first + lane, hit);
+            } else if hit.is_closer(best) {
+                *best = hit;
+                closer |= 1 << lane;
+            }
+        }
+        if !ANY {
+            // Move the ends of the rays that found a closer hit, all at once.
+            let end = ends_behind(simd, decided.t, self.scale[octet], self.extent);
+            let is_closer = mask32x8::from_bitmask(simd, closer);
+            let end = is_closer.select(end, f32x8::simd_from(simd, self.end[octet]));
+            self.end[octet] = end.into();
+        }
+        for lane in lanes(decided.unsure.into()) {
+            self.decide_one::<ANY>(mesh, first + lane, id);
         }
     }
 
@@ -488,11 +517,10 @@ impl Rays {
     /// Drops hits whose `t` is larger than that in `until` for their ray; call it before any are found. The range of a
     /// ray stays as it is and decides what is a hit. Places without a ray may hold anything.
     #[inline(always)]
-    pub(crate) fn take_until(&mut self, until: &[f32; GROUP]) {
-        let ends: &mut [f32; GROUP] = transmute_mut!(&mut self.end);
-        let scales: &[f32; GROUP] = transmute_ref!(&self.scale);
-        for ((end, &scale), &t) in ends.iter_mut().zip(scales).zip(until) {
-            *end = end_behind(t, scale, self.extent);
+    pub(crate) fn take_until<S: Simd>(&mut self, simd: S, until: &[f32; GROUP]) {
+        let octets: &PerRay = transmute_ref!(until);
+        for ((end, &scale), &t) in self.end.iter_mut().zip(&self.scale).zip(octets) {
+            *end = ends_behind(simd, t, scale, self.extent).into();
         }
         for (hit, &t) in self.hits.iter_mut().zip(until) {
             hit.t = t;
@@ -512,14 +540,6 @@ impl Rays {
     }
 }
 
-/// Returns a distance behind all hits that have this `t`. A hit may lie farther away than its `t`, which is rounded and
-/// off by a share of the corners' range ([`slab`](super::slab)).
-#[inline(always)]
-fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
-    let (end, growth) = (t * scale, growth_of_range(extent, scale));
-    end + (end.abs() * (WIDER - 1.0) + growth)
-}
-
 /// The lanes of a mask.
 pub(crate) fn lanes(mask: u64) -> impl Iterator<Item = u32> {
     let mut rest = mask;
@@ -536,51 +556,7 @@ const fn bits_below(count: usize) -> u64 {
     if count >= 8 { 0xff } else { (1 << count) - 1 }
 }
 
-/// The least and the greatest number of a row.
-#[inline(always)]
-fn interval<S: Simd>(simd: S, row: &PerRay) -> [f32; 2] {
-    let first = f32x8::simd_from(simd, row[0]);
-    let (mut low, mut high) = (first, first);
-    for octet in row.iter().skip(1) {
-        let numbers = f32x8::simd_from(simd, *octet);
-        (low, high) = (low.lesser(numbers), high.greater(numbers));
-    }
-    [low.reduce_min(), high.reduce_max()]
-}
-
 #[inline(always)]
 fn ends<S: Simd>(simd: S, [low, high]: [f32; 2]) -> [f32x8<S>; 2] {
     [f32x8::splat(simd, low), f32x8::splat(simd, high)]
-}
-
-/// Eight rays of three rows.
-#[inline(always)]
-fn octet_of<S: Simd>(simd: S, rows: &[PerRay; 3], octet: usize) -> [f32x8<S>; 3] {
-    let octet = octet % OCTETS;
-    let [a, b, c] = rows;
-    [
-        f32x8::simd_from(simd, a[octet]),
-        f32x8::simd_from(simd, b[octet]),
-        f32x8::simd_from(simd, c[octet]),
-    ]
-}
-
-/// Sixteen rays of a row.
-#[inline(always)]
-fn sixteen<S: Simd>(simd: S, row: &PerRay, which: usize) -> f32x16<S> {
-    let rows: &[[f32; 16]; OCTETS / 2] = transmute_ref!(row);
-    f32x16::simd_from(simd, rows[which % (OCTETS / 2)])
-}
-
-#[inline(always)]
-fn put(row: &mut PerRay, ray: usize, number: f32) {
-    let row: &mut [f32; GROUP] = transmute_mut!(row);
-    row[ray % GROUP] = number;
-}
-
-#[inline(always)]
-fn get(row: &PerRay, ray: u32) -> f32 {
-    // Use a flat array, which takes one index, not two.
-    let row: &[f32; GROUP] = transmute_ref!(row);
-    row[ray as usize % GROUP]
 }

@@ -24,10 +24,13 @@
 //! The direction is scaled by a power of two so that its largest component lies between 1 and 2, and the
 //! range of the ray with it: distances are about those in the tree, whatever the direction's length.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8};
 use glam::Vec3A;
 
 use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::{Approach, FAR_EXTENTS};
+use crate::extremes::Extremes;
 use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::ray::{Ray, round};
 use crate::triangle::OF_CORNERS;
@@ -57,6 +60,23 @@ pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 #[inline(always)]
 pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
     extent * OF_CORNERS + TINY * scale.max(1.0)
+}
+
+/// Returns a distance behind all hits that have this `t`. A hit may lie farther away than its `t`, which is rounded and
+/// off by a share of the corners' range.
+#[inline(always)]
+pub(crate) fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
+    let (end, growth) = (t * scale, growth_of_range(extent, scale));
+    end + (end.abs() * (WIDER - 1.0) + growth)
+}
+
+/// The same for eight rays, with the same bits.
+#[inline(always)]
+pub(crate) fn ends_behind<S: Simd>(simd: S, t: [f32; 8], scale: [f32; 8], extent: f32) -> f32x8<S> {
+    let scale = f32x8::simd_from(simd, scale);
+    let end = f32x8::simd_from(simd, t) * scale;
+    let growth = scale.greater(f32x8::splat(simd, 1.0)) * TINY + extent * OF_CORNERS;
+    end + (end.abs() * (WIDER - 1.0) + growth)
 }
 
 /// A ray, ready for boxes.
@@ -227,4 +247,35 @@ pub(super) const FLIP: usize = 3;
 #[inline(always)]
 pub(super) fn flips_of(slab: &Slab) -> NearSides {
     slab.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+
+    const SCALES: [f32; 8] = [1e-37, 0.25, 0.5, 1.0, 2.0, 4.0, 1e6, 1e37];
+
+    /// The ends of eight rays with hits at the same `t`, in a tree of an extent.
+    struct Ends(f32, f32);
+
+    impl Kernel for Ends {
+        type Output = [f32; 8];
+
+        fn run<S: Simd>(self, simd: S) -> [f32; 8] {
+            ends_behind(simd, [self.0; 8], SCALES, self.1).into()
+        }
+    }
+
+    #[test]
+    fn ends_of_eight_rays_are_those_of_each() {
+        for level in SimdLevel::available() {
+            for t in [0.0, 1e-40, 0.3, 7.0, f32::MAX, f32::INFINITY] {
+                for extent in [1e-37, 1.7, 1e12] {
+                    let eight = dispatch(level, Ends(t, extent)).map(f32::to_bits);
+                    assert_eq!(eight, SCALES.map(|scale| end_behind(t, scale, extent).to_bits()));
+                }
+            }
+        }
+    }
 }
