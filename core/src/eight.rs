@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 use zerocopy::{transmute, transmute_ref};
 
-use crate::filter::{RayFilter, splat};
+use crate::filter::RayFilter;
 use crate::mesh::{LastPart, TriangleMesh};
 use crate::ray::Ray;
 
@@ -49,15 +49,6 @@ impl<S: Simd> Eight<S> {
         let corners = [join(a, d), join(b, e), join(c, f)];
         let used = used | used_high << (LANES / 2);
         Self { corners, used: used & ((1 << count.min(LANES)) - 1) }
-    }
-
-    /// One triangle in all lanes.
-    #[inline(always)]
-    pub(crate) fn one(simd: S, mesh: &TriangleMesh<'_>, id: u32) -> Self {
-        match mesh.triangle(id) {
-            Some(triangle) => Self { corners: splat(simd, &triangle), used: 0xff },
-            None => Self { corners: [[f32x8::splat(simd, 0.0); 3]; 3], used: 0 },
-        }
     }
 }
 

@@ -35,7 +35,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8};
 
 use crate::eight::{Eight, LANES, columns};
-use crate::mesh::TriangleMesh;
+use crate::filter::splat;
+use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, Ray};
 use crate::triangle::{OUTSIDE, SMALL};
@@ -80,23 +81,23 @@ impl Decided {
 
 /// The triangles of eight pairs.
 #[derive(Clone, Copy)]
-pub(crate) enum Triangles {
-    /// One a pair. So many of the first pairs matter; the others are read, too.
-    Each([u32; LANES], usize),
-    /// One for all. The pairs that matter, as bits.
-    One(u32, u32),
+pub(crate) enum Triangles<'t> {
+    /// A triangle for each pair, and how many of the first pairs count. The others are read, too.
+    Each { ids: [u32; LANES], count: usize },
+    /// The same triangle for all pairs, and those that passed its filter, as bits. No others count.
+    One { triangle: &'t Triangle, passed: u32 },
 }
 
 /// Decides up to eight pairs.
 ///
-/// `vectorize` makes the test a function of its own, compiled for the same instructions. A group decides in three
+/// `vectorize` makes the test a function of its own, compiled for the same instructions. A group decides in several
 /// places, so the compiler calls it there instead of writing it out three times.
 #[inline(always)]
 pub(crate) fn decide<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     rays: [&Ray; LANES],
-    triangles: Triangles,
+    triangles: Triangles<'_>,
 ) -> Decided {
     simd.vectorize(
         #[inline(always)]
@@ -109,11 +110,13 @@ fn decide_in_line<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     rays: [&Ray; LANES],
-    triangles: Triangles,
+    triangles: Triangles<'_>,
 ) -> Decided {
     let (triangles, wanted) = match triangles {
-        Triangles::Each(ids, count) => (Eight::of(simd, mesh, ids, count), 0xff),
-        Triangles::One(id, wanted) => (Eight::one(simd, mesh, id), wanted),
+        Triangles::Each { ids, count } => (Eight::of(simd, mesh, ids, count), 0xff),
+        Triangles::One { triangle, passed } => {
+            (Eight { corners: splat(simd, triangle), used: 0xff }, passed)
+        }
     };
     let (origin, t_min, direction, t_max) = columns(simd, rays);
 
@@ -268,14 +271,13 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::mesh::Triangle;
     use crate::samples::{Random, along, line, triangle};
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
     use crate::triangle::TriangleTest;
 
     /// Eight rays, each with the triangle of its lane; then all with the first triangle.
     #[derive(Clone, Copy)]
-    struct Lanes<'a>(&'a [Ray; LANES], &'a TriangleMesh<'a>);
+    struct Lanes<'a>(&'a [Ray; LANES], &'a [Triangle; LANES], &'a TriangleMesh<'a>);
 
     impl Kernel for Lanes<'_> {
         type Output = [Decided; 2];
@@ -283,9 +285,10 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> [Decided; 2] {
-            let Self(rays, mesh) = self;
-            [Triangles::Each([0, 1, 2, 3, 4, 5, 6, 7], LANES), Triangles::One(0, 0xff)]
-                .map(|triangles| decide(simd, mesh, rays.each_ref(), triangles))
+            let Self(rays, [triangle, ..], mesh) = self;
+            let each = Triangles::Each { ids: [0, 1, 2, 3, 4, 5, 6, 7], count: LANES };
+            let one = Triangles::One { triangle, passed: 0xff };
+            [each, one].map(|triangles| decide(simd, mesh, rays.each_ref(), triangles))
         }
     }
 
@@ -304,7 +307,7 @@ mod tests {
         [[end, last], [first, end], [end, t + 1.0], [0.0, end]][random.below(4)]
     }
 
-    /// Makes eight pairs in each round and decides them at each level, and the eight rays with the first triangle. Checks
+    /// Makes eight pairs in each round. Decides them at each level, and the eight rays with the first triangle. Checks
     /// those that are sure, and adds up the hits and the unsure lanes.
     fn check(
         rounds: u32,
@@ -316,7 +319,7 @@ mod tests {
         for (rays, triangles) in (0..rounds).map(|_| make()) {
             let mesh = TriangleMesh::new(triangles.as_flattened(), &indices).unwrap();
             for level in SimdLevel::available() {
-                let [each, first] = dispatch(level, Lanes(&rays, &mesh));
+                let [each, first] = dispatch(level, Lanes(&rays, &triangles, &mesh));
                 let all = |decided, one| (0..LANES).map(move |lane| (decided, lane, lane * one));
                 for (decided, lane, at) in all(&each, 1).chain(all(&first, 0)) {
                     let (ray, triangle) = (&rays[lane], &triangles[at]);

@@ -8,7 +8,7 @@ use hgrid_core::{
     Strided, StridedMut, Verdict,
 };
 use hgrid_lab::camera::{Camera, Up, View};
-use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::meshes::{Mesh, ball, room, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
@@ -292,6 +292,74 @@ fn tiles_through_a_flat_scene_agree() {
             count += hits.iter().filter(|hit| **hit != Hit::MISS).count();
         }
         assert!(count > 1000, "{count} hits");
+    }
+}
+
+/// Returns a group of rays that end at their hits, or soon behind them. `place` moves and scales points.
+fn short_rays(
+    grid: &Grid<'_>,
+    random: &mut Random,
+    round: usize,
+    place: impl Fn([f32; 3]) -> [f32; 3],
+) -> [Ray; 64] {
+    let middle = random.point().map(|c| c * 0.6);
+    let odd = odd_rays()[round / 4 % odd_rays().len()];
+    std::array::from_fn(|i| {
+        let (beside, mut direction) = (random.point(), random.point());
+        let mut origin: [f32; 3] = std::array::from_fn(|k| middle[k] + beside[k] * 1e-3);
+        match round % 4 {
+            // From many places.
+            1 => origin = beside.map(|c| c * 0.8),
+            // From both sides of a wall, all along its normal.
+            2 => {
+                origin = std::array::from_fn(|k| [-1.1, 0.0, 0.0][k] + beside[k] * 0.4);
+                direction[0] = direction[0].abs();
+            }
+            _ => {}
+        }
+        let ray = Ray::new(place(origin), direction);
+        let hit = grid.intersect(&ray);
+        let unit = place([1.0; 3])[0] - place([0.0; 3])[0];
+        // A `t` that was rounded down ends a ray before its hit.
+        let end = |hit: Hit| [hit.t.next_up(), hit.t * 1.2][i % 2];
+        let t_max = hit.map_or(0.5 * unit, end);
+        match (round % 4, i) {
+            // One ray reaches its hit; the others are shorter, and some are odd.
+            (3, 24..32) => Ray { t_max, ..odd },
+            (3, 1..) => Ray { t_max: 0.05 * unit, ..ray },
+            _ => Ray { t_max, ..ray },
+        }
+    })
+}
+
+/// Groups of short rays in all directions. Most hits are on flat walls, beyond which no ray of a group reaches.
+#[test]
+fn short_rays_in_all_directions_agree() {
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    for (scale, shift) in [(1.0, 0.0), (1.0, 1e4), (1e-37, 0.0), (1e-20, 0.0), (1e12, 0.0)] {
+        let place = |p: [f32; 3]| p.map(|c| (c + shift) * scale);
+        let mesh = room().map(place);
+        let view = mesh.view();
+        let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let mut count = 0;
+        for round in 0..160 {
+            let rays = short_rays(&grid, &mut random, round, place);
+            let expected = alone(&grid, &rays);
+            for level in levels() {
+                let grid = grid.with_simd(level);
+                let (mut hits, mut blocked) = ([Hit::MISS; 64], [7_u8; 64]);
+                let (given, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+                grid.intersect_n(&given, answers, Coherence::Coherent).unwrap();
+                assert_eq!(hits.as_slice(), expected, "{scale:e} {shift} {level:?}");
+                let answers = &mut StridedMut::new(&mut blocked);
+                grid.occluded_n(&given, answers, Coherence::Coherent).unwrap();
+                let is_hit = |hit: &Hit| u8::from(*hit != Hit::MISS);
+                assert!(hits.iter().map(is_hit).eq(blocked), "{scale:e} {shift} {level:?}");
+            }
+            count += expected.iter().filter(|hit| **hit != Hit::MISS).count();
+        }
+        assert!(count > 2000, "{scale:e} {shift}: {count} hits");
     }
 }
 

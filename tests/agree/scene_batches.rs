@@ -23,13 +23,13 @@ fn rays(scene: &Scene<'_>, width: f64) -> Vec<RayF64> {
         let at = |i: u16| (i % 16, i / 16);
         rays.extend((0..256).map(|i| RayF64::from(&camera.ray(at(i).0, at(i).1, size))));
     }
-    // Rays as from a surface: neighbouring origins that f32 cannot represent, half of them with an end.
+    // Rays as from a surface: neighbouring origins that f32 cannot represent. At least half of them have an end.
     let mut random = Random(11);
-    for _ in 0..4 {
+    for long in [f32::INFINITY, 0.3, f32::INFINITY, 0.1] {
         let from = random.point().map(|c| f64::from(c) * width);
         rays.extend((0..128).map(|i| {
             let from = [from[0] + 1e-3 * f64::from(i) + 1e-11, from[1], from[2]];
-            let t_max = [f32::INFINITY, 0.5][i as usize % 2] * width as f32;
+            let t_max = [long, 0.5][i as usize % 2] * width as f32;
             RayF64 { t_max, ..RayF64::new(from, random.point()) }
         }));
     }

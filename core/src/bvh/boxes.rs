@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! decode      side = byte * step + node's origin - origin of the group, or fine side - origin of the group
-//! beam        the interval of all rays against eight boxes: which are met by none, which by all
+//! beam        all rays against eight boxes: which are met by none, which by all
 //! one ray     against eight boxes
 //! more rays   sixteen against one box
 //! ```
@@ -21,6 +21,17 @@
 //!
 //! The factor for far sides is 1 + 16 u, and boxes grow by 8 u times the largest coordinate of an origin. Products stay
 //! finite, because trees with an extent of 2^48 and more are not traced in groups.
+//!
+//! The box that short rays sweep reaches on each axis from their origins to `direction * end + origin`. A hit lies
+//! between these two, and in a box of the tree, up to roundings:
+//!
+//! ```text
+//! of the end      origin 1, product 1, sum 1             2 u * length + 2 u * origin
+//! of the box      node's origin 1, sum 1, growth 1       3 u * length + 3 u * origin
+//! ```
+//!
+//! This is less than the 16 u by which ends are widened, and the 8 u by which boxes grow. What underflows is added to
+//! the swept box.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
@@ -49,16 +60,23 @@ pub(crate) struct Slabs<V> {
     pub(crate) end: V,
 }
 
+/// With more rays than this, the beam of a group is tested before the rays.
+pub(super) const FEW_RAYS: u32 = 8;
+
 /// All rays of a group as intervals, in all lanes. On an axis on which directions have both signs, the
 /// inverse directions are unbounded.
 #[derive(Clone, Copy)]
 pub(crate) struct Beam<S: Simd> {
-    /// The ends of the interval. On a bounded axis, rays from the first one reach a side first.
+    /// The ends of the interval. On a bounded axis, a ray from the first one reaches a side earlier than one from the
+    /// second.
     pub(crate) origin: [[f32x8<S>; 2]; 3],
     pub(crate) inverse: [[f32x8<S>; 2]; 3],
     pub(crate) is_bounded: [bool; 3],
     /// The sign of the directions on a bounded axis: true if all are positive.
     pub(crate) is_positive: [bool; 3],
+    /// The box around all rays, from their origins to their ends. If directions have both signs on an axis and all rays
+    /// are short, it is tested in place of the intervals. It only tells the boxes that no ray meets.
+    pub(crate) swept: Option<[[f32x8<S>; 2]; 3]>,
     pub(crate) start: f32x8<S>,
     pub(crate) end: f32x8<S>,
 }
@@ -135,6 +153,10 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
     /// Intersects a beam with the boxes.
     #[inline(always)]
     pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> BeamMet<S> {
+        if let Some([x, y, z]) = beam.swept {
+            let some = self.meet_swept(x, 0) & self.meet_swept(y, 1) & self.meet_swept(z, 2);
+            return BeamMet { some: bits(some), all: 0, enter: beam.start };
+        }
         // Bound the distances at which the rays enter the boxes and leave them.
         let (mut enter, mut leave) = (beam.start, f32x8::splat(simd, f32::INFINITY));
         let (mut all_in, mut first_out) = (beam.start, leave);
@@ -157,6 +179,12 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         }
         let leave = (leave * f32x8::splat(simd, WIDER)).lesser(beam.end);
         BeamMet { some: bits(!enter.simd_gt(leave)), all: bits(all_in.simd_lt(first_out)), enter }
+    }
+
+    /// Returns the lanes whose box has a coordinate in an interval.
+    #[inline(always)]
+    fn meet_swept(&self, [low, high]: [f32x8<S>; 2], axis: usize) -> mask32x8<S> {
+        self.low[axis].simd_le(high) & self.high[axis].simd_ge(low)
     }
 }
 

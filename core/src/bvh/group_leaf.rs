@@ -94,13 +94,13 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
             filter_for_each::<S, ANY>(simd, leaf, rays, mask);
         } else {
             // Many rays: filter each triangle for eight rays at a time.
-            let octets = mask.to_le_bytes();
+            let of_octets = mask.to_le_bytes();
             for &id in ids {
                 let Some(triangle) = mesh.triangle(id) else { continue };
                 let corners = crate::filter::splat(simd, &triangle);
                 let size = rays.size_of(simd, &corners, mask);
                 for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
-                    let of_octet = u32::from(octets[octet]);
+                    let of_octet = u32::from(of_octets[octet]);
                     if of_octet == 0 {
                         continue;
                     }
@@ -112,7 +112,7 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
                     }
                     let mut survivors = of_octet & !bits(dropped);
                     if survivors.count_ones() >= MANY {
-                        rays.decide_octet::<S, ANY>(simd, mesh, first, survivors, id);
+                        rays.decide_octet::<S, ANY>(simd, mesh, first, survivors, (id, &triangle));
                         continue;
                     }
                     while survivors != 0 {

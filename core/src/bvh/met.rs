@@ -10,7 +10,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
-use super::boxes::{Beam, WideBoxes, bits};
+use super::boxes::{Beam, FEW_RAYS, WideBoxes, bits};
 use super::node::WIDTH;
 use super::per_ray::GROUP;
 use super::rays::Rays;
@@ -18,9 +18,6 @@ use crate::extremes::Extremes;
 
 // Masks of rays are 64 bits, and `one_by_one` takes them in two halves.
 const _: () = assert!(GROUP == 64);
-
-/// With more rays than this, the beam of all rays is tested before the rays.
-const FEW_RAYS: u32 = 8;
 
 /// Counts the vectors of eight rays that hold at least one of some rays.
 #[inline(always)]
@@ -63,10 +60,12 @@ impl Met {
             some &= beam.some;
             (all, enter) = (some & beam.all, beam.enter);
         }
-        // Ray by ray, each ray takes one test of all eight boxes. Box by box, each box that the beam left undecided
-        // takes one test for every sixteen rays, which counts as two.
+        // Ray by ray, each ray takes one vector test of all eight boxes. Box by box, each box that the beam left
+        // undecided takes one test for every eight rays, or for every sixteen if vectors have sixteen lanes.
         let unsure = some & !all;
-        if count <= octets(mask) * unsure.count_ones() {
+        let octets = octets(mask);
+        let vectors = if S::f32s::LEN < 16 { octets } else { octets.div_ceil(2) };
+        if count <= vectors * unsure.count_ones() {
             one_by_one(simd, boxes, rays, mask, wants_near, self);
         } else {
             side_by_side(simd, boxes, rays, mask, unsure, wants_near, self);

@@ -47,9 +47,9 @@ pub(super) fn sixteen<S: Simd>(simd: S, row: &PerRay, which: usize) -> f32x16<S>
 
 /// Sets the number of a ray.
 #[inline(always)]
-pub(super) fn put(row: &mut PerRay, ray: usize, number: f32) {
+pub(super) fn put(row: &mut PerRay, ray: u32, number: f32) {
     let row: &mut [f32; GROUP] = transmute_mut!(row);
-    row[ray % GROUP] = number;
+    row[ray as usize % GROUP] = number;
 }
 
 /// The number of a ray.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! prepare     find the rays that can hit; scale directions; bound the filter's error
-//! beam        the interval of all origins and inverse directions
+//! beam        the interval of all origins and inverse directions, or the box around short rays
 //! candidate   collect pairs of a ray and a triangle that passed the filter
 //! decide      test eight pairs, or eight rays with a triangle, in f64; keep the closest hit of each ray, or end it
 //! ```
@@ -12,7 +12,7 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use glam::Vec3A;
 use zerocopy::{FromZeros, transmute_ref};
 
-use super::boxes::{Beam, Slabs, bits, splat};
+use super::boxes::{Beam, FEW_RAYS, Slabs, bits, splat};
 use super::per_ray::{GROUP, OCTETS, PerRay, get, interval, octet_of, put, sixteen};
 use super::slab::{EARLIER, STEEP, TINY, WIDER, end_behind, ends_behind};
 use crate::aabb::{Aabb, greater, lesser};
@@ -21,7 +21,7 @@ use crate::before;
 use crate::eight::columns;
 use crate::extremes::Extremes;
 use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter, Size, nearby_floor, rate};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Choice;
 use crate::pairs::{self, Triangles};
 use crate::ray::{Hit, INVALID_ID, Ray};
@@ -90,6 +90,9 @@ const FEW_PAIRS: usize = 2;
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
 const UNIT: f32 = 1.0 / 16_777_216.0;
+
+/// More than what underflows on the way to the end of a ray and to a side of a box.
+const UNDERFLOW: f32 = 8.0 * TINY;
 
 impl Rays {
     /// No rays yet.
@@ -241,6 +244,7 @@ impl Rays {
         let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
         let [x, y, z] = inverses;
         let is_positive = inverses.map(|[low, _]| low > 0.0);
+        let is_bounded = inverses.map(|[low, high]| low > 0.0 || high < 0.0);
         let order = |[low, high]: [f32; 2], axis: usize| {
             if is_positive[axis] { [high, low] } else { [low, high] }
         };
@@ -254,14 +258,44 @@ impl Rays {
             start = start.lesser(is_alive.select(from, first));
             end = end.greater(is_alive.select(to, first));
         }
+        let end = end.reduce_max();
+        let mut swept = None;
+        let is_tested = self.alive.count_ones() > FEW_RAYS;
+        if is_tested && is_bounded != [true; 3] && end < self.extent {
+            let [x, y, z] = self.swept(simd);
+            swept = Some([ends(simd, x), ends(simd, y), ends(simd, z)]);
+        }
         Beam {
             origin: [ends(simd, a), ends(simd, b), ends(simd, c)],
             inverse: [ends(simd, x), ends(simd, y), ends(simd, z)],
-            is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
+            is_bounded,
             is_positive,
+            swept,
             start: f32x8::splat(simd, start.reduce_min()),
-            end: f32x8::splat(simd, end.reduce_max()),
+            end: f32x8::splat(simd, end),
         }
+    }
+
+    /// The box around all rays, from their origins to their ends, relative to the centre.
+    #[inline(always)]
+    fn swept<S: Simd>(&self, simd: S) -> [[f32; 2]; 3] {
+        let mut swept = self.origins;
+        for (axis, [least, most]) in swept.iter_mut().enumerate() {
+            // The first ray starts at 0, so 0 widens nothing.
+            let zero = f32x8::splat(simd, 0.0);
+            let (mut low, mut high) = (zero, zero);
+            for octet in 0..OCTETS {
+                let is_alive = mask32x8::from_bitmask(simd, self.alive >> (8 * octet));
+                let origin = f32x8::simd_from(simd, self.anchor[axis][octet]) - self.center[axis];
+                let direction = f32x8::simd_from(simd, self.direction[axis][octet]);
+                let end = direction * f32x8::simd_from(simd, self.end[octet]) + origin;
+                let end = is_alive.select(end, zero);
+                (low, high) = (low.lesser(end), high.greater(end));
+            }
+            *least = lesser(*least, low.reduce_min()) - UNDERFLOW;
+            *most = greater(*most, high.reduce_max()) + UNDERFLOW;
+        }
+        swept
     }
 
     /// One ray in all lanes.
@@ -411,7 +445,7 @@ impl Rays {
         let (of, ids) = (self.pair_places, self.pair_ids);
         let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
-        let decided = pairs::decide(simd, mesh, rays, Triangles::Each(ids, count));
+        let decided = pairs::decide(simd, mesh, rays, Triangles::Each { ids, count });
         for lane in lanes(decided.seen(self.choice.cull).into()) {
             let at = lane as usize % PAIRS;
             self.found::<ANY>(mesh, of[at], decided.hit(at, ids[at]));
@@ -422,7 +456,8 @@ impl Rays {
         }
     }
 
-    /// Decides a triangle for those of eight rays that passed its filter, as bits; `first` is the first of the eight.
+    /// Decides a triangle, given with its id, for those of eight rays that passed its filter, as bits; `first` is the
+    /// first of the eight.
     #[inline(always)]
     pub(crate) fn decide_octet<S: Simd, const ANY: bool>(
         &mut self,
@@ -430,21 +465,24 @@ impl Rays {
         mesh: &TriangleMesh<'_>,
         first: u32,
         passed: u32,
-        id: u32,
+        (id, triangle): (u32, &Triangle),
     ) {
         if !self.choice.has(mesh, id) {
             return;
         }
         let octet = first as usize / 8 % OCTETS;
         let rays = &self.given.as_chunks::<8>().0[octet];
-        let decided = pairs::decide(simd, mesh, rays.each_ref(), Triangles::One(id, passed));
+        let triangles = Triangles::One { triangle, passed };
+        let decided = pairs::decide(simd, mesh, rays.each_ref(), triangles);
         let mut closer = 0;
         for lane in lanes(decided.seen(self.choice.cull).into()) {
             let hit = decided.hit(lane as usize, id);
-            let best = &mut self.hits[(first + lane) as usize % GROUP];
             if ANY {
                 self.found::<ANY>(mesh, first + lane, hit);
-            } else if hit.is_closer(best) {
+                continue;
+            }
+            let best = &mut self.hits[(first + lane) as usize % GROUP];
+            if hit.is_closer(best) {
                 *best = hit;
                 closer |= 1 << lane;
             }
@@ -536,7 +574,7 @@ impl Rays {
     #[inline(always)]
     pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
         let end = end_behind(t, get(&self.scale, ray), self.extent);
-        put(&mut self.end, ray as usize % GROUP, end);
+        put(&mut self.end, ray, end);
     }
 }
 

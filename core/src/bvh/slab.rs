@@ -70,7 +70,7 @@ pub(crate) fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
     end + (end.abs() * (WIDER - 1.0) + growth)
 }
 
-/// The same for eight rays, with the same bits.
+/// [`end_behind`] of eight rays, with the same bits.
 #[inline(always)]
 pub(crate) fn ends_behind<S: Simd>(simd: S, t: [f32; 8], scale: [f32; 8], extent: f32) -> f32x8<S> {
     let scale = f32x8::simd_from(simd, scale);
@@ -261,6 +261,7 @@ mod tests {
 
     impl Kernel for Ends {
         type Output = [f32; 8];
+        const IS_WIDE: bool = true;
 
         fn run<S: Simd>(self, simd: S) -> [f32; 8] {
             ends_behind(simd, [self.0; 8], SCALES, self.1).into()
@@ -270,7 +271,7 @@ mod tests {
     #[test]
     fn ends_of_eight_rays_are_those_of_each() {
         for level in SimdLevel::available() {
-            for t in [0.0, 1e-40, 0.3, 7.0, f32::MAX, f32::INFINITY] {
+            for t in [-3.0, -0.0, 0.0, 1e-40, 0.3, 7.0, f32::MAX, f32::INFINITY] {
                 for extent in [1e-37, 1.7, 1e12] {
                     let eight = dispatch(level, Ends(t, extent)).map(f32::to_bits);
                     assert_eq!(eight, SCALES.map(|scale| end_behind(t, scale, extent).to_bits()));
