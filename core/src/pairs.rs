@@ -91,7 +91,7 @@ pub(crate) enum Triangles<'t> {
 /// Decides up to eight pairs.
 ///
 /// `vectorize` makes the test a function of its own, compiled for the same instructions. A group decides in several
-/// places, so the compiler calls it there instead of writing it out three times.
+/// places, so the compiler calls it there instead of writing it out each time.
 #[inline(always)]
 pub(crate) fn decide<S: Simd>(
     simd: S,
@@ -112,10 +112,10 @@ fn decide_in_line<S: Simd>(
     rays: [&Ray; LANES],
     triangles: Triangles<'_>,
 ) -> Decided {
-    let (triangles, wanted) = match triangles {
-        Triangles::Each { ids, count } => (Eight::of(simd, mesh, ids, count), 0xff),
+    let Eight { corners: [a, b, c], used } = match triangles {
+        Triangles::Each { ids, count } => Eight::of(simd, mesh, ids, count),
         Triangles::One { triangle, passed } => {
-            (Eight { corners: splat(simd, triangle), used: 0xff }, passed)
+            Eight { corners: splat(simd, triangle), used: passed }
         }
     };
     let (origin, t_min, direction, t_max) = columns(simd, rays);
@@ -125,7 +125,6 @@ fn decide_in_line<S: Simd>(
     let [ox, oy, oz] = wide(turn.to_z(origin));
     let [dx, dy, dz] = wide(turn.to_z(direction));
     let (shear_x, shear_y) = (dx / dz, dy / dz);
-    let [a, b, c] = triangles.corners;
     let (origin, shear) = ([ox, oy, oz], [shear_x, shear_y]);
     let a = place(wide(turn.to_z(a)), origin, shear);
     let b = place(wide(turn.to_z(b)), origin, shear);
@@ -164,10 +163,9 @@ fn decide_in_line<S: Simd>(
         & along.simd_ge(from - outside)
         & along.simd_le(to + outside);
 
-    let wanted = wanted & triangles.used;
     let candidates = is_inside & (is_small | (has_area & is_close));
     let mut sure = !is_small & is_between;
-    if bits(candidates & !sure) & wanted != 0 {
+    if bits(candidates & !sure) & used != 0 {
         // Some triangles reach beyond an end. Their hits may lie clearly inside.
         let deepest = first.abs().max(last.abs());
         let width = widest(a).max(widest(b)).max(widest(c)) + deepest;
@@ -178,8 +176,8 @@ fn decide_in_line<S: Simd>(
         sure |= !is_small & is_wide & is_clear;
     }
     Decided {
-        hits: bits(candidates & sure) & wanted,
-        unsure: bits(candidates & !sure) & wanted,
+        hits: bits(candidates & sure) & used,
+        unsure: bits(candidates & !sure) & used,
         fronts: !(bits(area.simd_gt(zero)) ^ bits(is_forward)),
         t: (rounded(depth / dz).max(t_min).min(t_max) + 0.0).into(),
         u: rounded(weights[1]).into(),
