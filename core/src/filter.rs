@@ -60,14 +60,12 @@
 //! With X <= 2^60 nothing overflows: no intermediate value exceeds 12 * 2^122 + 24 * 2^121 < 2^127.
 //! Beyond that the floor is infinite and nothing is dropped.
 
-use core::ops::{Add, Mul, Sub};
-
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, mask32x8};
+use fearless_simd::{Simd, f32x8};
 
-use crate::aabb::{greater, lesser};
+use crate::aabb::greater;
 use crate::approach::{FAR_EXTENTS, Reach};
-use crate::extremes::Extremes;
+use crate::lanes::Lanes;
 use crate::mesh::Triangle;
 use crate::ray::round;
 
@@ -96,89 +94,6 @@ const NEARBY_EXTENTS: f32 = FAR_EXTENTS + 1.0;
 /// Directions that are longer or shorter are not scaled in f32.
 pub(crate) const NEARBY_LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
 pub(crate) const NEARBY_SHORT: f32 = f32::from_bits(0x0180_0000); // 2^-124
-
-/// Numbers that the filter works on: one f32, or eight.
-pub(crate) trait Lanes:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
-    /// An answer in each lane.
-    type Mask;
-
-    fn magnitude(self) -> Self;
-
-    /// Multiplies by a number and adds another; fused where the machine does both at once.
-    fn times_plus(self, factor: Self, summand: Self) -> Self;
-
-    /// Multiplies by a number and subtracts another; fused likewise.
-    fn times_minus(self, factor: Self, subtrahend: Self) -> Self;
-
-    /// The greater of two numbers. With a NaN among them it is any number or NaN.
-    fn or_greater(self, other: Self) -> Self;
-
-    /// Returns true if one of three numbers is below `-error` and one above `error`. `edges[2]` is NaN if one of the
-    /// others is, and then it is false.
-    fn are_opposite(edges: [Self; 3], error: Self) -> Self::Mask;
-}
-
-impl Lanes for f32 {
-    type Mask = bool;
-
-    #[inline(always)]
-    fn magnitude(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, summand: Self) -> Self {
-        self * factor + summand
-    }
-
-    #[inline(always)]
-    fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
-        self * factor - subtrahend
-    }
-
-    #[inline(always)]
-    fn or_greater(self, other: Self) -> Self {
-        greater(self, other)
-    }
-
-    #[inline(always)]
-    fn are_opposite([u, v, w]: [Self; 3], error: Self) -> bool {
-        // `lesser` and `greater` give the second number if either is NaN, so a NaN in w is left out.
-        lesser(w, lesser(u, v)) < -error && greater(w, greater(u, v)) > error
-    }
-}
-
-impl<S: Simd> Lanes for f32x8<S> {
-    type Mask = mask32x8<S>;
-
-    #[inline(always)]
-    fn magnitude(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, summand: Self) -> Self {
-        self.mul_add(factor, summand)
-    }
-
-    #[inline(always)]
-    fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
-        self.mul_sub(factor, subtrahend)
-    }
-
-    #[inline(always)]
-    fn or_greater(self, other: Self) -> Self {
-        self.greater(other)
-    }
-
-    #[inline(always)]
-    fn are_opposite([u, v, w]: [Self; 3], error: Self) -> mask32x8<S> {
-        // With a NaN among them, both are a NaN or the same number: one comparison is false.
-        w.lesser(u.lesser(v)).simd_lt(-error) & w.greater(u.greater(v)).simd_gt(error)
-    }
-}
 
 /// Lines as the filter sees them: one a lane, or the same one in all.
 #[derive(Debug, Clone, Copy)]
@@ -312,7 +227,13 @@ impl<L: Lanes> Size<L> {
 impl<L: Lanes> LineFilter<L> {
     /// The lanes whose triangles the f64 test is sure to miss.
     #[inline(always)]
-    pub(crate) fn drops(&self, [a, b, c]: &[[L; 3]; 3], size: &Size<L>) -> L::Mask {
+    pub(crate) fn drops(&self, corners: &[[L; 3]; 3], size: &Size<L>) -> L::Mask {
+        L::are_opposite(self.edges(corners), self.error(size))
+    }
+
+    /// U, V and W.
+    #[inline(always)]
+    pub(crate) fn edges(&self, [a, b, c]: &[[L; 3]; 3]) -> [L; 3] {
         // Written out: arrays that are mapped live in memory.
         let d = self.direction;
         let g = minus(self.origin, *a);
@@ -322,10 +243,14 @@ impl<L: Lanes> LineFilter<L> {
         let q = cross(g, e);
         let u = dot(g, p);
         let v = dot(d, q);
-        let w = dot(e, p) - u - v;
+        [u, v, dot(e, p) - u - v]
+    }
 
+    /// The error of each of them.
+    #[inline(always)]
+    pub(crate) fn error(&self, size: &Size<L>) -> L {
         let of_longest = size.reach.times_plus(self.rate, self.slack);
-        L::are_opposite([u, v, w], size.longest.times_plus(of_longest, self.floor))
+        size.longest.times_plus(of_longest, self.floor)
     }
 }
 

@@ -89,7 +89,6 @@ mod aabb;
 mod approach;
 mod arena;
 mod batch;
-mod before;
 mod bits;
 mod blob;
 mod budget;
@@ -113,6 +112,7 @@ mod fnv;
 mod grid;
 mod inspect;
 mod invariant;
+mod lanes;
 mod limits;
 mod lists;
 mod mesh;
@@ -127,6 +127,7 @@ mod pairs;
 mod query;
 #[cfg(test)]
 mod random;
+mod range;
 mod ray;
 #[cfg(feature = "recursive")]
 mod recursive;

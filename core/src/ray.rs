@@ -127,6 +127,12 @@ impl Hit {
     /// The hit that a batch writes for a ray that hits nothing.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 
+    /// A hit of which only the triangle is known: its `t` is the start of the ray.
+    #[inline(always)]
+    pub(crate) const fn somewhere(ray: &Ray, primitive: u32) -> Self {
+        Self { t: ray.t_min, u: 0.0, v: 0.0, primitive }
+    }
+
     /// Returns true if this hit is reported rather than the other: smaller `t`, then smaller id.
     #[inline(always)]
     #[must_use]

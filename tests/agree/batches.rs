@@ -250,6 +250,13 @@ fn rays_of_any_speed_agree_at_any_scale() {
                 let answers = &mut StridedMut::new(&mut hits);
                 grid.intersect_n(&Strided::new(&rays), answers, Coherence::Coherent).unwrap();
                 assert_eq!(hits.as_slice(), alone(&grid, &rays), "{scale:e} {length:e}");
+                let (rays, mut occluded) = (Strided::new(&rays), [0_u8; 64]);
+                for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                    let answers = &mut StridedMut::new(&mut occluded);
+                    grid.occluded_n(&rays, answers, coherence).unwrap();
+                    let expected = hits.map(|hit| u8::from(hit != Hit::MISS));
+                    assert_eq!(occluded, expected, "{scale:e} {length:e} {coherence:?}");
+                }
                 counts.push(hits.iter().filter(|hit| **hit != Hit::MISS).count());
             }
         }

@@ -304,8 +304,8 @@ mod tests {
         }
     }
 
-    /// Prepares rays of all directions that start up to so far apart, and compares their sizes of triangles and their
-    /// filters with those of each ray alone.
+    /// Prepares rays of all directions that start up to so far apart. Compares their ranges, their sizes of triangles
+    /// and their filters with those of each ray alone.
     struct Sizes<'a>(&'a mut Random, f32);
 
     impl Kernel for Sizes<'_> {
@@ -316,11 +316,17 @@ mod tests {
             let mut rays = Rays::new(Choice::ALL);
             for ray in rays.slots() {
                 *ray = Ray::new(random.point().map(|x| x * apart), random.point());
+                ray.t_max = [1.5, f32::MAX, f32::INFINITY][random.below(3)];
             }
             let given: Vec<Ray> = rays.slots().to_vec();
             let bounds = Aabb { min: Vec3A::splat(-1.0), max: Vec3A::splat(1.0) };
             rays.prepare(simd, GROUP, &bounds);
             for (lane, ray) in (0..).zip(&given).filter(|(lane, _)| rays.alive >> lane & 1 == 1) {
+                let its_own = |range: [f32x8<S>; 2]| {
+                    range.map(|ends| <[f32; 8]>::from(ends)[lane as usize % 8].to_bits())
+                };
+                let range = its_own(rays.ranges_of(simd, lane as usize / 8));
+                assert_eq!(its_own(rays.range_of(simd, lane)), range);
                 let alone =
                     RayFilter::new(ray.direction, ray.origin, 0.0, Reach::of(&bounds, ray.origin));
                 let filter = rays.filter(simd, lane);

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! triangles   filter them, all at once for each ray or eight rays at a time for each triangle;
-//!             decide what passes in f64: eight rays with a triangle if many of them pass its filter,
+//!             for any hit, end the rays that a triangle surely blocks (range.rs);
+//!             decide what else passes in f64: eight rays with a triangle if many of them pass its filter,
 //!             else eight pairs of a ray and a triangle
 //! boxes       intersect them as the boxes of a node; offer each that rays meet, the nearest first
 //! ```
@@ -94,13 +95,15 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
             filter_for_each::<S, ANY>(simd, leaf, rays, mask);
         } else {
             // Many rays: filter each triangle for eight rays at a time.
-            let of_octets = mask.to_le_bytes();
             for &id in ids {
                 let Some(triangle) = mesh.triangle(id) else { continue };
                 let corners = crate::filter::splat(simd, &triangle);
                 let size = rays.size_of(simd, &corners, mask);
+                let may_block = ANY && rays.are_ended_by(mesh, id);
                 for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
-                    let of_octet = u32::from(of_octets[octet]);
+                    // Leave out rays that another triangle of the leaf has ended.
+                    let left = if ANY { mask & rays.alive } else { mask };
+                    let of_octet = u32::from(left.to_le_bytes()[octet]);
                     if of_octet == 0 {
                         continue;
                     }
@@ -111,6 +114,13 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
                         dropped |= filter.passes_before(simd, &corners, &size, start);
                     }
                     let mut survivors = of_octet & !bits(dropped);
+                    if may_block && survivors != 0 {
+                        let range = rays.ranges_of(simd, octet);
+                        let hits = filter.surely_hits(simd, &corners, &size, range);
+                        let blocked = survivors & bits(hits);
+                        rays.block(u64::from(blocked) << first, id);
+                        survivors &= !blocked;
+                    }
                     if survivors.count_ones() >= MANY {
                         rays.decide_octet::<S, ANY>(simd, mesh, first, survivors, (id, &triangle));
                         continue;
@@ -128,7 +138,8 @@ impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
     }
 }
 
-/// Filters all triangles of a leaf at once for each ray of a mask, and notes what passes.
+/// Filters all triangles of a leaf at once for each ray of a mask. Notes what passes; with `ANY` ends the rays that a
+/// triangle surely blocks.
 #[inline(always)]
 pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
     simd: S,
@@ -150,6 +161,17 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
             dropped |= filter.passes_before(simd, &triangles.corners, &size, start);
         }
         let mut survivors = !bits(dropped) & triangles.used;
+        if ANY && survivors != 0 && rays.may_block {
+            let range = rays.range_of(simd, ray);
+            let hits = filter.surely_hits(simd, &triangles.corners, &size, range);
+            let blocker = (survivors & bits(hits)).trailing_zeros() as usize;
+            if let Some(&id) = ids.get(blocker)
+                && rays.are_ended_by(mesh, id)
+            {
+                rays.block(1 << ray, id);
+                continue;
+            }
+        }
         while survivors != 0 {
             let lane = survivors.trailing_zeros();
             survivors &= survivors - 1;

@@ -27,7 +27,6 @@ use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::{FLIP, NearSides, Slab, flips_of};
 use super::stack::{StackEntry, pop, push};
 use crate::aabb::{Aabb, greater, lesser};
-use crate::before;
 use crate::budget::Budget;
 use crate::counters::Tally;
 use crate::eight::Eight;
@@ -35,6 +34,7 @@ use crate::extremes::Extremes;
 use crate::filter::{LineFilter, RayFilter, Size};
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
+use crate::range;
 use crate::ray::Ray;
 use crate::search::{Outcome, Search};
 use crate::simd::{HAS_VECTORS, Kernel};
@@ -331,7 +331,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
         // A ray from inside the box of the tree may leave a triangle.
         let origin = Vec3A::from(ray.origin);
-        let may_leave = afar.is_none() && before::pays(bounds, &Aabb { min: origin, max: origin });
+        let may_leave = afar.is_none() && range::pays(bounds, &Aabb { min: origin, max: origin });
         let leaves_at = may_leave.then(|| slab.distance(ray.t_min));
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
