@@ -35,7 +35,7 @@
 //! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
 //! | helpers | `invariant`, `budget`, `extremes`, `tasks`; `random` and `samples` for tests |
 //! | memory | `arena`, `bits`, `lists`, `fnv`, `survey`, `cell`, `blob`, `bump` |
-//! | rays and triangles | `filter`, `before`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
+//! | rays and triangles | `lanes`, `filter`, `range`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |
 //! | receivers of a traversal: of hits, of id lists | `search`, `visit` |
 //! | structures, a folder each | `one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh` |
