@@ -154,7 +154,7 @@ impl<S: Simd> LineFilter<f32x8<S>> {
     /// The lanes whose ray surely hits its triangle, from whichever side, between two distances along the scaled
     /// direction.
     ///
-    /// It shares most terms with the other tests, too.
+    /// The other tests compute most of its terms, too, so the compiler computes only the rest.
     #[inline(always)]
     pub(crate) fn surely_hits(
         &self,
@@ -243,13 +243,16 @@ mod tests {
         }
     }
 
-    /// What the f64 test says about random rays, and how much of it is known beforehand.
+    /// Counts random rays.
     #[derive(Default)]
     struct Found {
+        /// Rays that hit their triangle.
         hits: u32,
+        /// Those of them of which `surely_hits` says so.
         sure: u32,
-        /// Triangles that the line meets before the start.
+        /// Rays whose line meets the triangle before they start.
         before: u32,
+        /// Those of them of which `passes_before` says so.
         dropped: u32,
     }
 
@@ -282,7 +285,7 @@ mod tests {
                 let is_hit =
                     TriangleTest::new(&ray).is_some_and(|test| test.test(&triangle).is_some());
 
-                // The line meets it, and the end does not cut it off.
+                // The line meets the triangle, and the end of the range does not exclude the hit.
                 let is_before_start = !is_hit && met.is_some() && t_max == f32::INFINITY;
 
                 let [a, b, c] = triangle.map(glam::Vec3A::from_array);
