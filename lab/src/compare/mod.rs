@@ -303,9 +303,12 @@ mod tests {
             for system in &scene.systems {
                 let name = &system.system;
                 assert_eq!(system.items(), u64::from(COUNT));
-                // The matrix, the place and the box of an instance take less than the structure of the mesh.
-                let each = system.index_bytes_per_item();
-                assert!((96.0..4000.0).contains(&each), "{name}: {each}");
+                // Some bytes of Embree are told from the heap of the whole program, and other tests use it too:
+                // tests/compare.rs checks them.
+                if !system.is_peer {
+                    let each = system.index_bytes_per_item();
+                    assert!((96.0..4000.0).contains(&each), "{name}: {each}");
+                }
                 assert!(system.peak_bytes >= system.index_bytes, "{name}");
                 assert!(system.first_build.seconds > 0.0 && system.rebuild.seconds > 0.0);
                 assert!(system.time_to_image(Kind::Rebuild).is_none());
