@@ -101,6 +101,16 @@ fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
         let all = of_a + of_b + of_c;
         return [of_b / all, of_c / all];
     }
+    // Beyond a corner in the directions of both of its edges, that corner is the closest.
+    if ab_a <= 0.0 && ac_a <= 0.0 {
+        return [0.0, 0.0];
+    }
+    if ab_b >= 0.0 && ac_b <= ab_b {
+        return [1.0, 0.0];
+    }
+    if ac_c >= 0.0 && ab_c <= ac_c {
+        return [0.0, 1.0];
+    }
     let along_bc = share(ac_b - ab_b, ab_c - ac_c);
     let edges = [[share(ab_a, -ab_b), 0.0], [0.0, share(ac_a, -ac_c)], [1.0 - along_bc, along_bc]];
     let distance = |[v, w]: [f64; 2]| (ap - ab * v - ac * w).length_squared();

@@ -4,7 +4,7 @@
 //! node = root
 //! loop: bound the distances from the point to the eight boxes of the node
 //!       descend into the nearest child within reach, push the others
-//!       a leaf of one triangle: test it in f64
+//!       a leaf of one triangle, or of two where bounds drop none: test them in f64
 //!       another: bound the distances to its triangles at once, test those within reach in f64, nearest first
 //!       pop what is still within reach
 //! ```
@@ -213,6 +213,9 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
         let ClosestSearch { bvh, mesh, bounds, point, within, test, tally, stack } = self;
         let point = Point::new(*point, bounds);
         let mut reach = point.reach(*within);
+        // Bounding a leaf costs as much as testing one triangle. It drops most pairs of a scan, but of two triangles
+        // that share the closest corner none: a leaf of two is bounded if the last bounds dropped one.
+        let mut unbounded = 2;
         let mut top = 0;
         let mut budget = bvh.budget();
         let mut child = Child::Inner(0);
@@ -252,14 +255,16 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     let ids = bvh.leaf(first, count);
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
-                    if let &[id] = ids {
-                        // Bounding a leaf costs as much as testing one triangle.
-                        reach = point.reach(test(id));
+                    if ids.len() <= unbounded {
+                        for &id in ids {
+                            reach = point.reach(test(id));
+                        }
                     } else {
                         let lanes = bvh.lanes(first, ids);
                         let eight = Eight::of(simd, mesh, lanes, ids.len());
                         let away = triangles(simd, &eight.corners, &point);
                         let mut rest = !bits(away.simd_gt(f32x8::splat(simd, reach))) & eight.used;
+                        unbounded = if rest == eight.used { 2 } else { 1 };
                         let away: [f32; WIDTH] = away.into();
                         while rest != 0 {
                             // The nearest first: it may show that the others are too far.
