@@ -768,12 +768,12 @@ typedef uint32_t hgrid_verdict;
  *
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's
  * line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
- * however close it starts. An end of the range needs this decision only if it lies between the vertices. The
- * reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may be up to 2^-21 Z
- * outside, and the end of the range is reported. A triangle whose own `t` lies farther outside is not
- * reported. The reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that
- * is farther from the origin than 2^50 times its size may be missed. (The source has the proof:
- * core/src/triangle.rs.)
+ * however close it starts. An end of the range needs this decision only if it lies between the least and the
+ * largest `t` of the vertices, or at one of them. Where a ray grazes a triangle, the `t` that follows from `u` and
+ * `v` may differ from that of the plane. If it lies outside of the range by no more than 2^-21 Z, and 2^-49 of the
+ * largest `t` of a vertex, the end of the range is reported; if it lies farther outside, there is no hit. The
+ * reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that is farther from
+ * the origin than 2^50 times its size may be missed. (The source has the proof: core/src/triangle.rs.)
  */
 typedef struct hgrid_hit {
     /**

@@ -39,7 +39,7 @@ use crate::filter::splat;
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, Ray};
-use crate::triangle::{OUTSIDE, SMALL};
+use crate::triangle::{OUTSIDE, ROUNDINGS, SMALL};
 
 /// The least S for which the depth may decide, in parts of the square of Q.
 const WIDE: f64 = 1.0 / (1 << 24) as f64;
@@ -157,7 +157,8 @@ fn decide_in_line<S: Simd>(
     let last = is_forward.select(high, -low);
     let along = is_forward.select(depth, -depth);
     let is_between = first.simd_gt(from) & last.simd_lt(to);
-    let outside = (last - first) * OUTSIDE;
+    let deepest = first.abs().max(last.abs());
+    let outside = (last - first) * OUTSIDE + deepest * ROUNDINGS;
     let is_close = last.simd_ge(from)
         & first.simd_le(to)
         & along.simd_ge(from - outside)
@@ -167,7 +168,6 @@ fn decide_in_line<S: Simd>(
     let mut sure = !is_small & is_between;
     if bits(candidates & !sure) & used != 0 {
         // Some triangles reach beyond an end. Their hits may lie clearly inside.
-        let deepest = first.abs().max(last.abs());
         let width = widest(a).max(widest(b)).max(widest(c)) + deepest;
         let margin = outside + deepest * CLEAR;
         let is_clear = (first.simd_gt(from) | along.simd_gt(from + margin))

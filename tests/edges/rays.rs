@@ -202,6 +202,52 @@ fn rays_along_borders(meshes: u64) {
     assert!(hits > 50 * meshes, "{hits}");
 }
 
+/// A shadow ray may end exactly on a wall, and a path may start there: the corners of the wall's triangles lie at one
+/// depth, the depth of the hit may be rounded to either side of it.
+#[test]
+fn ranges_end_exactly_at_walls() {
+    let mesh = ball(7, 0.0);
+    let view = mesh.view();
+    let mut random = Random(53);
+    // From inside a cube, 128ths away from its faces, to the face ahead.
+    let rays: Vec<_> = (0..rounds(128))
+        .map(|round| {
+            let mut part = |of: f32| (random.unit() * 128.0).floor() / 128.0 * of;
+            let distance = part(1.0) + 0.25;
+            let side = [1.0, -1.0][round % 2];
+            let mut origin = [part(0.5), part(-0.5), side * (1.0 - distance)];
+            let mut direction = [part(0.25), part(-0.25), side];
+            origin.rotate_right(round % 3);
+            direction.rotate_right(round % 3);
+            let [t_min, t_max] = [
+                [0.0, distance],
+                [distance, f32::INFINITY],
+                [distance, distance],
+                [f32::NEG_INFINITY, distance],
+            ][round / 6 % 4];
+            (Ray { origin, t_min, direction, t_max }, distance)
+        })
+        .collect();
+    assert_eq!(ask(&mesh, rays.iter().map(|(ray, _)| *ray)), rays.len());
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let asked: Vec<Ray> = rays.iter().map(|(ray, _)| *ray).collect();
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut hits, mut occluded) = (vec![Hit::MISS; asked.len()], vec![0_u8; asked.len()]);
+            grid.intersect_n(&Strided::new(&asked), &mut StridedMut::new(&mut hits), coherence)
+                .unwrap();
+            grid.occluded_n(&Strided::new(&asked), &mut StridedMut::new(&mut occluded), coherence)
+                .unwrap();
+            assert!(occluded.iter().all(|&is_occluded| is_occluded == 1), "{config:?}");
+            for ((ray, distance), hit) in rays.iter().zip(&hits) {
+                let is_there = ray.t_min == f32::NEG_INFINITY || hit.t == *distance;
+                assert!(is_there && *hit == grid.intersect(ray).unwrap(), "{config:?} {ray:?}");
+            }
+        }
+    }
+}
+
 /// Many triangles are hit at t = 0, and the answer must be the one with the lowest id, whatever cells they
 /// are in: vertices lie close to borders of cells, where a subgrid reaches farther than its cell.
 #[test]

@@ -7,7 +7,8 @@
 //! a corner's place     z = p.z - o.z, x = (p.x - o.x) - d.x / d.z * z, y likewise: every operation in f64
 //! inside               the edge functions of the places have no two opposite signs and are not all 0
 //! in the range         t_min <= T <= t_max, T where the line meets the plane of the corners as they are
-//! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z
+//! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z and 2^-49 of the
+//!                      largest t of a corner
 //! ```
 //!
 //! The rule defines the places as f64 data. Everything that follows from them is decided in f64 with a proved
@@ -155,14 +156,14 @@ impl Line {
         let sides = [0, 1].map(|end| self.meets(corners, self.range[end]));
         let [Some(first), Some(last)] = sides else {
             // If there is no plane, or the line lies in it, the places decide.
-            return self.places_answer(places, 0.0);
+            return self.places_answer(places, [0.0; 2]);
         };
         // If an end lies beyond all corners, so do all points between them.
         let is_ahead = along.iter().all(|&z| from < z);
         let is_before = along.iter().all(|&z| z < to);
         let is_in =
             (is_ahead || first != Ordering::Less) && (is_before || last != Ordering::Greater);
-        match self.places_answer(places, 1.0 / f64::from(1 << 21)) {
+        match self.places_answer(places, [2_f64.powi(-21), 2_f64.powi(-49)]) {
             _ if is_open => Answer::Either,
             Answer::Miss => Answer::Miss,
             _ if !is_in => Answer::Miss,
@@ -170,21 +171,23 @@ impl Line {
         }
     }
 
-    /// Returns a hit if the t of the places lies in the range, or no farther outside than a share `outside`
-    /// of the corners' range. That t is rounded: next to the limit the answer is `Either`.
-    fn places_answer(&self, places: &[Place; 3], outside: f64) -> Answer {
+    /// Returns a hit if the t of the places lies in the range, or no farther outside than a share of the corners' range
+    /// and one of the largest t of a corner. That t is rounded: next to the limit the answer is `Either`.
+    fn places_answer(&self, places: &[Place; 3], [of_width, of_largest]: [f64; 2]) -> Answer {
         let ([from, to], along) = self.along(places);
         let along = along.map(Dyadic::new);
         let [low, high] = extremes(&along);
         let width = &high - &low;
-        let outside = &width * &Dyadic::new(outside);
+        let [_, largest] = extremes(&along.clone().map(Dyadic::abs));
+        let outside = &(&width * &Dyadic::new(of_width)) + &(&largest * &Dyadic::new(of_largest));
         let weights = exact_edges(places).map(Dyadic::abs);
         let area = &(&weights[0] + &weights[1]) + &weights[2];
         let depth = dot(&weights, &along);
         // Multiply everything by the area, which is positive.
         let least = &(&Dyadic::new(from) - &outside) * &area;
         let most = &(&Dyadic::new(to) + &outside) * &area;
-        let error = (&depth.clone().abs() + &(&width * &area)).scaled(-38);
+        // The weights are off by 2^-41 of themselves. Their mean has seven roundings, its comparison one.
+        let error = &(&width.scaled(-38) + &largest.scaled(-50)) * &area;
         let margin = &depth - &least;
         let other = &most - &depth;
         if margin < -error.clone() || other < -error.clone() {
