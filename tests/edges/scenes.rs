@@ -1,8 +1,9 @@
 //! Odd scenes and odd shapes: a clear error or a defined answer.
 
 use hgrid_core::{
-    BlobInfo, Block, Boxes, BuildFlags, Config, ConfigField, Content, Error, Grid, Instance,
-    Member, Method, Object, Ray, RayF64, Region, Scene, ShapeHit, Shapes, Strided,
+    BlobInfo, Block, Boxes, BuildFlags, Coherence, Config, ConfigField, Content, Error, Grid,
+    Instance, Member, Method, Object, Ray, RayF64, Region, Scene, SceneHit, SceneOptions, ShapeHit,
+    Shapes, Strided, StridedMut,
 };
 use hgrid_tests::meshes::{Mesh, one_triangle};
 use hgrid_tests::owned::Owned;
@@ -80,6 +81,49 @@ fn scales_from_tiny_to_huge_are_traced() {
                     let short = RayF64 { t_max: hit.t * 0.99, ..ray };
                     assert!(!scene.occluded(&short));
                 }
+            }
+        }
+    });
+}
+
+/// An infinite end of the range is that of the finite numbers: what has a larger `t` is no hit, in a scene as in a grid.
+#[test]
+fn no_hit_is_farther_than_all_numbers() {
+    with_triangle(|objects| {
+        let behind = Instance { translation: [0.0, 0.0, -3e9], ..Instance::new(0) };
+        for instances in [vec![Instance::new(0)], vec![behind, Instance::new(0)]] {
+            let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+            let scene = built.open(objects).unwrap();
+            for (distance, length, is_hit) in [
+                (1e9, 1e-30_f32, false),
+                (1.0, 1e-44, false),
+                (-1e9, 1e-30, false),
+                (1e9, 1e-28, true),
+                (-1e9, 1e-28, true),
+                (1.0, 1e-38, true),
+            ] {
+                let ray = RayF64::new([0.25, 0.25, distance], [0.0, 0.0, -length]);
+                for t_max in [f32::INFINITY, f32::MAX] {
+                    let ray = RayF64 { t_min: -t_max, t_max, ..ray };
+                    let hit = scene.intersect(&ray);
+                    assert_eq!(hit.is_some(), is_hit, "{ray:?} {hit:?}");
+                    assert_eq!(scene.occluded(&ray), is_hit, "{ray:?}");
+                    let rays = vec![ray; 70];
+                    let mut hits = vec![SceneHit::MISS; rays.len()];
+                    let answers = &mut StridedMut::new(&mut hits);
+                    let options = &mut SceneOptions::default();
+                    scene
+                        .intersect_n(&Strided::new(&rays), answers, Coherence::Coherent, options)
+                        .unwrap();
+                    assert!(hits.iter().all(|found| *found == hit.unwrap_or(SceneHit::MISS)));
+                    assert!(hit.is_none_or(|hit| hit.t.is_finite()));
+                }
+                let never = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
+                assert!(
+                    never.iter().all(|&[t_min, t_max]| {
+                        !scene.occluded(&RayF64 { t_min, t_max, ..ray })
+                    })
+                );
             }
         }
     });

@@ -254,11 +254,12 @@ impl ObjectRay {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
+        let [t_min, t_max] = finite_part(ray);
         Some(Ray {
             origin: [at(0), at(1), at(2)],
-            t_min: self.object_t(ray.t_min),
+            t_min: self.object_t(t_min),
             direction: direction.map(round),
-            t_max: self.object_t(ray.t_max),
+            t_max: self.object_t(t_max),
         })
     }
 
@@ -309,8 +310,14 @@ impl ObjectRay {
     /// The `t` of the scene's ray, which lies in that ray's range.
     pub(super) fn scene_t(&self, t: f32, ray: &RayF64) -> f32 {
         let t = round((f64::from(t) + self.shift) / self.scale);
-        lesser(greater(t, ray.t_min), ray.t_max)
+        let [t_min, t_max] = finite_part(ray);
+        lesser(greater(t, t_min), t_max)
     }
+}
+
+/// The finite part of a ray's range; empty if there is none. A hit has a finite `t`.
+fn finite_part(ray: &RayF64) -> [f32; 2] {
+    [greater(ray.t_min, -f32::MAX), lesser(ray.t_max, f32::MAX)]
 }
 
 const _: () = assert!(size_of::<Instance>() == 72);
