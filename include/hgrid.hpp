@@ -748,6 +748,7 @@ public:
     ///
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
     /// or a field of a struct, from which on there are three: `field(faces, &face::corners)`.
+    /// One or two numbers that are left over at the end make no vertex or triangle, and are ignored.
     template <class Vertices, class Indices>
     mesh(Vertices &&vertices, Indices &&indices) noexcept
     {
@@ -2035,7 +2036,8 @@ private:
     ::hgrid_scene raw_ = HGRID_SCENE_INIT;
 };
 
-/// Makes an object of a grid or view; it stays where it is.
+/// Makes an object of a grid or view. Do not move the grid or view while a scene shows it: the scene shows nothing
+/// in its place then. A `std::vector` moves its grids when it grows.
 inline result<object> make_object(const view &of) noexcept
 {
     object made;

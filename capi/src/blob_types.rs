@@ -13,7 +13,8 @@ use hgrid_core::{BlobInfo, Content, Error, INVALID_ID, Refit, Statistics};
 pub struct hgrid_refit_report {
     /// `sizeof(hgrid_refit_report)`.
     pub struct_size: u32,
-    /// The triangle, shape or instance that is to blame for an error, or `HGRID_INVALID_ID`.
+    /// The triangle, shape or instance that is to blame for an error, or `HGRID_INVALID_ID` if the error names none.
+    /// `HGRID_ERROR_MESH_MISMATCH` names none.
     pub triangle: u32,
     /// The cost that the tree had; 0 after an error.
     pub cost_before: f64,

@@ -61,10 +61,10 @@ pub struct hgrid_ray {
 /// line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
 /// however close it starts. An end of the range needs this decision only if it lies between the least and the
 /// largest `t` of the vertices, or at one of them. Where a ray grazes a triangle, the `t` that follows from `u` and
-/// `v` may differ from that of the plane. If it lies outside of the range by no more than 2^-21 Z, and 2^-49 of the
-/// largest `t` of a vertex, the end of the range is reported; if it lies farther outside, there is no hit. The
-/// reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that is farther from
-/// the origin than 2^50 times its size may be missed. (The source has the proof: core/src/triangle.rs.)
+/// `v` may differ from that of the plane. If the former lies outside of the range by no more than 2^-21 Z + 2^-49 T,
+/// where T is the largest |t| of a vertex, the end of the range is reported. If it lies farther outside, there is
+/// no hit. The reported `t` is rounded, so a range that ends at it may exclude the same hit. A triangle that is
+/// farther from the origin than 2^50 times its size may be missed. (The source has the proof: core/src/triangle.rs.)
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_hit {

@@ -284,8 +284,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_UNSUPPORTED_VERSION => c"a blob of another version: build it again",
         HGRID_ERROR_TRUNCATED => c"a truncated blob: bring all of its bytes",
         HGRID_ERROR_MESH_MISMATCH => {
-            c"a blob of another mesh, or of a scene with another number of instances: \
-              bring what it was built for, or build it again"
+            c"a blob of another mesh, or of a scene with another number of instances; or, in a refit, \
+              a triangle that the build left out has finite vertices now: bring what it was built for, \
+              or build it again"
         }
         HGRID_ERROR_CANNOT_REFIT => c"a blob that cannot be refitted: only trees can, and before they are packed",
         HGRID_ERROR_OTHER_CONTENT => {

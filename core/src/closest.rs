@@ -40,7 +40,8 @@ pub struct ClosestPoint {
 impl ClosestPoint {
     /// The point of one triangle that is closest to a point. [`Grid::closest_point`] is the closest of these.
     ///
-    /// `None` if a coordinate is not finite. A triangle without area has points, too.
+    /// `None` if a coordinate is not finite, or the distance is more than `f32::MAX`. A triangle without area has
+    /// points, too.
     ///
     /// ```
     /// use hgrid_core::ClosestPoint;
@@ -88,9 +89,10 @@ impl ClosestPoint {
 /// The weights of b and c in the point of a triangle that is closest to p: a corner, or straight below p if that is
 /// inside, or else on the closest of the edges. A triangle without area has only corners and edges.
 ///
-/// `p - a`, the edges and the normal have one rounding or two, whatever the triangle's shape. So the place below p is
-/// off by 2^-50 |p - a| over the sine of the angle at a. Where that angle is small ([`NARROW`]), an edge is near: the
-/// closer of both is taken, which is off by no more than about 2^-25 of the longest side and of |p - a|.
+/// The normal is off by about 2^-51 |ab| |ac|, so the place below p is off by about 2^-50 |p - a| over the sine of the
+/// angle at a. If that angle is small ([`NARROW`]), every place inside is close to an edge, so the closer of both is
+/// taken. Its distance, and that of a corner, is off by no more than 2^-25 of the larger of |p - a| and the longest
+/// side.
 fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     let ap = p - a;
     let (ab_ab, ab_ac, ac_ac) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
@@ -127,7 +129,7 @@ fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     if is_inside { closer(on_edge, below) } else { on_edge }
 }
 
-/// The square of the sine of an angle that is small: 2^-20.
+/// An angle is small if the square of its sine is at most this: 2^-20.
 const NARROW: f64 = 1.0 / 1_048_576.0;
 
 /// Returns the place on an edge, from 0 to 1, of a point that is this far behind

@@ -51,9 +51,9 @@
 //! as it is, because then no rounding of W acts on a value above det; and those of the moved triangle, because the ray
 //! lies among its corners, as the filter's proof demands. So the f64 test finds the ray inside. It compares the point
 //! where the line meets the plane with both ends of the range exactly; the signs of N say with what result. Last, it
-//! demands that the mean of the corners' depths, weighted by the edge functions, lies in the range or at most 2^-21 R
-//! outside (and what its roundings need), where R is the difference between the depths. The exact mean of the triangle
-//! as it is lies inside, and the computed one is close to it:
+//! demands that the mean of the corners' depths, weighted by the edge functions, lies in the range, or outside by at
+//! most 2^-21 R and 2^-49 of the largest depth, where R is the difference between the depths. The exact mean of the
+//! triangle as it is lies inside, and the computed one is close to it:
 //!
 //! ```text
 //! corners   U + V + W is computed to be above 3 * 29 u E M, so 69 u E M < det < 13 E^2: M < 2^22 E, and m < 2^-28 E

@@ -42,9 +42,9 @@
 //! Next to an end of the range the rounded t must not decide: a ray must not hit the surface that it leaves. A
 //! triangle with all corners between the ends is in, one with all corners outside is out. For any other triangle the
 //! point T where the line meets its plane decides, exactly: in f64 with an error bound, and where that is not enough
-//! without rounding ([`exact`]), for all finite numbers. For a triangle that the ray grazes, the mean of the corners' t,
-//! weighted by U, V and W, may be another one: it must be at most 2^-21 Z outside, and 2^-49 of the largest t of a
-//! corner for its roundings. The t that is reported lies in the range.
+//! without rounding ([`exact`]), for all finite numbers. For a triangle that the ray grazes, the mean of the corners'
+//! t, weighted by U, V and W, may differ from T. It must be at most 2^-21 Z + 2^-49 M outside, where M is the largest
+//! |t| of a corner; the second term is for roundings. The t that is reported lies in the range.
 
 use core::cmp::Ordering;
 
@@ -120,8 +120,9 @@ pub(crate) const SMALL: f64 = 1.0 / (1 << 10) as f64;
 /// The most that the depth of a hit may lie outside of the range, in parts of the difference between the corners'
 /// depths, beside [`ROUNDINGS`].
 pub(crate) const OUTSIDE: f64 = 1.0 / (1 << 21) as f64;
-/// The error of a hit's depth and of its comparison with an end of the range, in parts of the largest depth of a corner:
-/// eight roundings are less than 2^-49. Corners at one depth, of a wall that faces the ray, have no difference.
+/// A bound of the roundings in a hit's depth and in its comparison with an end of the range, in parts of the largest
+/// depth of a corner: one in a corner's depth, seven in their mean, one in the comparison. Without it, a wall that
+/// faces the ray would be lost, because the difference between its depths is 0.
 pub(crate) const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
 
 /// Twice the error of a hit's `t` that its corners cause, in parts of the range of their t: 2^-37. In scaled distances
@@ -488,7 +489,6 @@ mod tests {
         assert!(hit(&ray(-1.0, 0.125)).is_some() && hit(&ray(0.125, f32::INFINITY)).is_some());
     }
 
-    /// For every axis that the ray is nearly parallel to, and both ways along it.
     /// Walls that face the ray, and nearly so: roundings of the depth must not decide.
     #[test]
     fn a_range_may_end_exactly_at_a_wall() {
@@ -534,6 +534,7 @@ mod tests {
         assert!(cfg!(miri) || met > 800 && lost.iter().all(|&lost| lost > 800), "{met} {lost:?}");
     }
 
+    /// For every axis that the ray is nearly parallel to, and both ways along it.
     #[test]
     fn a_triangle_shows_its_front_where_its_corners_run_counter_clockwise() {
         for axis in 0..3 {

@@ -86,7 +86,8 @@ fn scales_from_tiny_to_huge_are_traced() {
     });
 }
 
-/// An infinite end of the range is that of the finite numbers: what has a larger `t` is no hit, in a scene as in a grid.
+/// An infinite end of the range is that of the finite numbers: what has a larger `t` is no hit, in a scene as in a
+/// grid.
 #[test]
 fn no_hit_is_farther_than_all_numbers() {
     with_triangle(|objects| {
@@ -109,14 +110,20 @@ fn no_hit_is_farther_than_all_numbers() {
                     assert_eq!(hit.is_some(), is_hit, "{ray:?} {hit:?}");
                     assert_eq!(scene.occluded(&ray), is_hit, "{ray:?}");
                     let rays = vec![ray; 70];
-                    let mut hits = vec![SceneHit::MISS; rays.len()];
-                    let answers = &mut StridedMut::new(&mut hits);
-                    let options = &mut SceneOptions::default();
-                    scene
-                        .intersect_n(&Strided::new(&rays), answers, Coherence::Coherent, options)
-                        .unwrap();
-                    assert!(hits.iter().all(|found| *found == hit.unwrap_or(SceneHit::MISS)));
-                    assert!(hit.is_none_or(|hit| hit.t.is_finite()));
+                    let rays = Strided::new(&rays);
+                    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                        let (mut hits, mut occluded) = ([SceneHit::MISS; 70], [0_u8; 70]);
+                        let (to, options) =
+                            (&mut StridedMut::new(&mut hits), &mut SceneOptions::default());
+                        scene.intersect_n(&rays, to, coherence, options).unwrap();
+                        let to = &mut StridedMut::new(&mut occluded);
+                        scene.occluded_n(&rays, to, coherence, options).unwrap();
+                        assert!(hits.iter().all(|found| *found == hit.unwrap_or(SceneHit::MISS)));
+                        assert!(occluded.iter().all(|&found| found == u8::from(is_hit)));
+                    }
+                    // The last instance is the closer one.
+                    let last = instances.len() as u32 - 1;
+                    assert!(hit.is_none_or(|hit| hit.t.is_finite() && hit.path[0] == last));
                 }
                 let never = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
                 assert!(

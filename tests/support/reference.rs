@@ -7,8 +7,8 @@
 //! a corner's place     z = p.z - o.z, x = (p.x - o.x) - d.x / d.z * z, y likewise: every operation in f64
 //! inside               the edge functions of the places have no two opposite signs and are not all 0
 //! in the range         t_min <= T <= t_max, T where the line meets the plane of the corners as they are
-//! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z and 2^-49 of the
-//!                      largest t of a corner
+//! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z + 2^-49 T,
+//!                      where T is the largest |t| of a corner
 //! ```
 //!
 //! The rule defines the places as f64 data. Everything that follows from them is decided in f64 with a proved
@@ -148,11 +148,6 @@ impl Line {
         if along.iter().all(|&z| z < from) || along.iter().all(|&z| z > to) {
             return Answer::Miss;
         }
-        // A corner that was rounded to an end may lie on either side of it.
-        let is_open = corners.iter().zip(along).any(|(corner, z)| {
-            let [p, o] = [self.turned(*corner)[2], self.origin[2]].map(Dyadic::new);
-            (z == from || z == to) && &p - &o != Dyadic::new(self.place(*corner)[2])
-        });
         let sides = [0, 1].map(|end| self.meets(corners, self.range[end]));
         let [Some(first), Some(last)] = sides else {
             // If there is no plane, or the line lies in it, the places decide.
@@ -164,7 +159,6 @@ impl Line {
         let is_in =
             (is_ahead || first != Ordering::Less) && (is_before || last != Ordering::Greater);
         match self.places_answer(places, [2_f64.powi(-21), 2_f64.powi(-49)]) {
-            _ if is_open => Answer::Either,
             Answer::Miss => Answer::Miss,
             _ if !is_in => Answer::Miss,
             answer => answer,
@@ -186,8 +180,10 @@ impl Line {
         // Multiply everything by the area, which is positive.
         let least = &(&Dyadic::new(from) - &outside) * &area;
         let most = &(&Dyadic::new(to) + &outside) * &area;
-        // The weights are off by 2^-41 of themselves. Their mean has seven roundings, its comparison one.
-        let error = &(&width.scaled(-38) + &largest.scaled(-50)) * &area;
+        // The weights are off by 2^-41 of themselves. Their mean has seven roundings, its comparison one: 2^-50, and
+        // a little of second order.
+        let roundings = &largest.clone().scaled(-50) + &largest.scaled(-90);
+        let error = &(&width.scaled(-38) + &roundings) * &area;
         let margin = &depth - &least;
         let other = &most - &depth;
         if margin < -error.clone() || other < -error.clone() {

@@ -4,7 +4,7 @@
 //! node = root
 //! loop: bound the distances from the point to the eight boxes of the node
 //!       descend into the nearest child within reach, push the others
-//!       a leaf of one triangle, or of two where bounds drop none: test them in f64
+//!       a leaf of one triangle, or of two unless the last bounds dropped one: test them in f64
 //!       another: bound the distances to its triangles at once, test those within reach in f64, nearest first
 //!       pop what is still within reach
 //! ```
@@ -213,8 +213,9 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
         let ClosestSearch { bvh, mesh, bounds, point, within, test, tally, stack } = self;
         let point = Point::new(*point, bounds);
         let mut reach = point.reach(*within);
-        // Bounding a leaf costs as much as testing one triangle. It drops most pairs of a scan, but of two triangles
-        // that share the closest corner none: a leaf of two is bounded if the last bounds dropped one.
+        // Bounding a leaf costs as much as testing one triangle. It drops most pairs of a scan, but none of two
+        // triangles that share the closest corner. So a leaf of two is bounded only if the last bounds dropped a
+        // triangle, and in a tree whose leaves hold no more than two none is.
         let mut unbounded = 2;
         let mut top = 0;
         let mut budget = bvh.budget();

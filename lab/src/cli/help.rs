@@ -48,7 +48,8 @@ Examples:
   hgrid pack bunny.ply -o bunny.hgrid --method one-level
 
 Programs open it by hgrid_open without a mesh, or Grid::open_packed, at a multiple of 64 bytes and
-on machines of the same byte order.";
+on machines of the same byte order. Instances of a glTF file are written as triangles. To store
+instances, call hgrid_pack_scene.";
 
 pub(super) const VALIDATE_EXAMPLES: &str = "\
 Examples:
@@ -108,7 +109,7 @@ Examples:
 
 pub(super) const SCENES: &str = "\
 Scenes:
-  FILE.ply, .obj, .stl, .gltf, .glb, or .hgrid with a mesh in it
+  FILE.ply, .obj, .stl, .gltf, .glb, or .hgrid with a mesh in it: only the mesh is read, its grid is built again
   procedural:knot[:TRIANGLES]     a closed, finely bumped surface, like a scan
   procedural:stage[:TRIANGLES]    the same on a floor eighty times its size
   procedural:soup[:TRIANGLES]     a cube full of small triangles

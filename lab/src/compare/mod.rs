@@ -303,8 +303,8 @@ mod tests {
             for system in &scene.systems {
                 let name = &system.system;
                 assert_eq!(system.items(), u64::from(COUNT));
-                // Some bytes of Embree are told from the heap of the whole program, and other tests use it too:
-                // tests/compare.rs checks them.
+                // For Embree some bytes are measured on the heap of the whole program, which other tests use, too.
+                // So tests/compare.rs checks Embree's.
                 if !system.is_peer {
                     let each = system.index_bytes_per_item();
                     assert!((96.0..4000.0).contains(&each), "{name}: {each}");
