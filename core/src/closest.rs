@@ -95,6 +95,7 @@ impl ClosestPoint {
 /// side.
 fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     let ap = p - a;
+    // `ab_c` is the product of edge ab with p - c, and so on; `ab_ac` that of two edges.
     let (ab_ab, ab_ac, ac_ac) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
     let (ab_a, ac_a) = (ab.dot(ap), ac.dot(ap));
     let (ab_b, ac_b) = (ab_a - ab_ab, ac_a - ab_ac);

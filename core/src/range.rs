@@ -248,11 +248,11 @@ mod tests {
     struct Found {
         /// Rays that hit their triangle.
         hits: u32,
-        /// Those of them of which `surely_hits` says so.
+        /// Rays that `surely_hits` finds to hit their triangle.
         sure: u32,
         /// Rays whose line meets the triangle before they start.
         before: u32,
-        /// Those of them of which `passes_before` says so.
+        /// Rays that `passes_before` finds to meet the triangle before they start.
         dropped: u32,
     }
 

@@ -240,25 +240,25 @@ fn the_point_of_a_triangle_is_the_closest_one() {
         let between = |part: f32| std::array::from_fn(|k| a[k] + part * (b[k] - a[k]));
         match round % 10 {
             0 => triangle[2] = triangle[round / 10 % 2],
-            // Slivers, whose third corner lies on the edge between the others, or is one of them, up to rounding.
+            // Slivers: the third corner lies on the edge between the others, or next to one of them.
             1 => triangle[2] = between(part),
             2 => triangle[2] = between(0.5),
             3 => triangle[2] = b.map(|x| x * (1.0 + 1e-7 * part)),
             4 => triangle[2] = std::array::from_fn(|k| b[k] + 1e-6 * c[k]),
             5 => triangle[2] = std::array::from_fn(|k| a[k] + 1e-4 * part * c[k]),
-            // Of Fibonacci numbers: as high as 2^-48 of its length.
+            // Corners of Fibonacci numbers: this triangle is 2^-48 as high as long.
             6 => triangle = fibonacci,
             _ => {}
         }
         triangle.rotate_left(round / 10 % 3);
         let [a, b, c] = triangle;
-        // Slivers are passed by close by.
+        // Put most points next to their sliver.
         if matches!(round % 10, 1..=6) && round % 4 != 0 {
             let part = random.unit();
             let near = random.point().map(|x| x * [1e-9, 1e-5, 1e-2][round / 30 % 3]);
             let across = std::array::from_fn::<_, 3, _>(|k| f32::midpoint(a[k], c[k]));
             point = std::array::from_fn(|k| across[k] + part * (b[k] - across[k]) + near[k]);
-            // Next to the corner at zero, numbers have many digits more than the triangle's.
+            // Next to the corner at zero, the coordinates of a point have more digits than those of the triangle.
             if round % 20 == 6 {
                 point = near;
             }

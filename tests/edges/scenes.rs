@@ -86,8 +86,7 @@ fn scales_from_tiny_to_huge_are_traced() {
     });
 }
 
-/// An infinite end of the range is that of the finite numbers: what has a larger `t` is no hit, in a scene as in a
-/// grid.
+/// A hit has a finite `t`, in a scene as in a grid. An infinite `t_max` accepts no more hits than the largest number.
 #[test]
 fn no_hit_is_farther_than_all_numbers() {
     with_triangle(|objects| {

@@ -109,7 +109,8 @@ Examples:
 
 pub(super) const SCENES: &str = "\
 Scenes:
-  FILE.ply, .obj, .stl, .gltf, .glb, or .hgrid with a mesh in it: only the mesh is read, its grid is built again
+  FILE.ply, .obj, .stl, .gltf, .glb, or .hgrid with a mesh in it
+                                  (of a .hgrid file only the mesh is read: its grid is built again)
   procedural:knot[:TRIANGLES]     a closed, finely bumped surface, like a scan
   procedural:stage[:TRIANGLES]    the same on a floor eighty times its size
   procedural:soup[:TRIANGLES]     a cube full of small triangles
