@@ -3,8 +3,8 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{BlobInfo, Block, Member, Object};
+use anyhow::{Context as _, Result, bail, ensure};
+use hgrid_core::{BlobInfo, Block, Error, Member, Object};
 
 use crate::file;
 
@@ -27,12 +27,13 @@ impl Blob {
         let mut memory = vec![Block::ZERO; Block::count_for(length)];
         let bytes = &mut Block::bytes_mut(&mut memory)[..length];
         file.read_exact(bytes).context("cannot read it")?;
-        let needed = BlobInfo::peek(bytes).context("it is not a blob that this version reads")?;
-        ensure!(
-            length as u64 >= needed.total_bytes,
-            "it is cut off: it has {length} bytes of {}",
-            needed.total_bytes
-        );
+        let needed = match BlobInfo::peek(bytes) {
+            Err(Error::Truncated { needed_bytes, .. }) => {
+                bail!("it is cut off: it has {length} bytes, and its header alone {needed_bytes}")
+            }
+            info => info.context("it is not a blob that this version reads")?.total_bytes,
+        };
+        ensure!(length as u64 >= needed, "it is cut off: it has {length} bytes of {needed}");
         Ok(Self { memory, length })
     }
 

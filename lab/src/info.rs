@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use hgrid_core::{BlobInfo, Content, Grid, Scene as Instances};
+use hgrid_core::{BlobInfo, Content, Grid, Parameters, Scene as Instances};
 use indicatif::HumanCount;
 use serde::Serialize;
 
@@ -112,6 +112,9 @@ struct BlobFacts {
 /// The grid of a blob that has its mesh.
 #[derive(Debug, PartialEq, Serialize)]
 struct GridFacts {
+    /// How a tree was built.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quality: Option<&'static str>,
     bounds: [[f32; 3]; 2],
     triangles_not_finite: u32,
     triangles_without_area: u32,
@@ -225,6 +228,8 @@ impl BlobFacts {
             ("format", format!("{}, version {}", self.format, self.version)),
             ("method", self.method.to_owned()),
         ];
+        let quality = self.grid.as_ref().and_then(|grid| grid.quality);
+        rows.extend(quality.map(|quality| ("quality", quality.to_owned())));
         rows.extend(self.triangles.map(|_| ("mesh", mesh.to_owned())));
         let counts = [
             ("triangles", self.triangles.map(u64::from)),
@@ -288,7 +293,12 @@ impl BlobFacts {
 impl GridFacts {
     fn of(grid: &Grid<'_>) -> Self {
         let ((min, max), found) = (grid.bounds(), grid.inspect());
+        let quality = match grid.config().parameters {
+            Parameters::Bvh { quality } => Some(quality.name()),
+            _ => None,
+        };
         Self {
+            quality,
             bounds: [min, max],
             triangles_not_finite: found.skipped_count,
             triangles_without_area: found.degenerate_count,

@@ -22,12 +22,12 @@ use crate::scene::format::Format;
 pub fn run(args: &ValidateArgs) -> Result<()> {
     let path = &args.blob;
     let file = path.display();
-    if let Ok(format) = Format::of(path)
-        && format != Format::Blob
-    {
+    let cannot = || format!("cannot read `{file}`");
+    let format = Format::of(path).with_context(cannot)?;
+    if format != Format::Blob {
         bail!("`{file}` is {}, not a blob: `hgrid pack` makes one", format.article());
     }
-    let blob = Blob::read(path).with_context(|| format!("cannot read `{file}`"))?;
+    let blob = Blob::read(path).with_context(cannot)?;
     let info = BlobInfo::peek(blob.bytes())?;
     if info.content == Content::Packed {
         return prove_scene(path, &blob, &info);

@@ -267,11 +267,16 @@ fn packed_files_are_described_proved_and_rendered() {
     let folder = Folder::new("pack").unwrap();
     let facts = folder.says("info a.obj").unwrap();
     assert!(facts.contains("OBJ") && facts.contains("0 0 0  to  1 1 1"), "{facts}");
-    for options in ["", "--method one-level --density 2", "--quality high"] {
+    for (options, quality) in [
+        ("", "fast".into()),
+        ("--method one-level --density 2", serde_json::Value::Null),
+        ("--quality high", "high".into()),
+    ] {
         folder.says(&format!("pack a.obj -o a.hgrid {options}")).unwrap();
         let json: serde_json::Value =
             serde_json::from_str(&folder.says("info a.hgrid --json").unwrap()).unwrap();
         assert_eq!((&json["triangles"], &json["has_mesh"]), (&3.into(), &true.into()));
+        assert_eq!(json["quality"], quality);
         let total = fs::metadata(folder.0.join("a.hgrid")).unwrap().len();
         assert_eq!(json["total_bytes"], total);
         let facts = folder.says("info a.hgrid").unwrap();
@@ -283,6 +288,15 @@ fn packed_files_are_described_proved_and_rendered() {
     let blob = fs::read(folder.0.join("a.hgrid")).unwrap();
     fs::write(folder.0.join("cut.hgrid"), &blob[..blob.len() - 64]).unwrap();
     assert!(folder.fails("validate cut.hgrid").unwrap().contains("it is cut off"));
+    fs::write(folder.0.join("stub.hgrid"), &blob[..60]).unwrap();
+    for command in ["info", "validate"] {
+        let said = folder.fails(&format!("{command} stub.hgrid")).unwrap();
+        let expected = "`stub.hgrid`: it is cut off: it has 60 bytes, and its header alone 128";
+        assert!(said.contains(expected), "{said}");
+        fs::write(folder.0.join("text"), "what is it?\n").unwrap();
+        let said = folder.fails(&format!("{command} text")).unwrap();
+        assert!(said.contains("cannot read `text`: it has another format"), "{said}");
+    }
     fs::write(folder.0.join("long.hgrid"), [&blob[..], &[0; 3]].concat()).unwrap();
     let said = folder.says("validate long.hgrid").unwrap();
     assert!(

@@ -96,8 +96,8 @@ impl Format {
     pub fn read(self, path: &Path) -> Result<Model> {
         let bytes = || fs::read(path).context("cannot read it");
         Ok(match self {
-            Self::Ply => ply::load(path)?.into(),
-            Self::Obj => obj::read(&bytes()?)?.into(),
+            Self::Ply => ply::load(path)?,
+            Self::Obj => obj::read(&bytes()?)?,
             Self::Stl => stl::read(&bytes()?)?.into(),
             Self::Gltf => gltf::read(&bytes()?, path)?,
             Self::Blob => packed::load(path)?.into(),

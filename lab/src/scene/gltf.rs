@@ -10,7 +10,7 @@ use core::ops::Range;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, bail, ensure};
 use base64::Engine as _;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::buffer::Source;
@@ -38,6 +38,9 @@ const LOOKS: [&str; 6] = [
 
 /// The extension of positions that are whole numbers of 8 or 16 bits.
 const QUANTIZED: &str = "KHR_mesh_quantization";
+
+/// The start of the message for a file that breaks a rule of the format.
+const INVALID: &str = "it is not a valid glTF file";
 
 /// Reads the bytes of a file, and the files that it names beside it.
 ///
@@ -80,12 +83,16 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
-/// Counts what the file has and this reader ignores: animations, skins, morph targets and cameras, in words.
+/// Counts what the file has and this reader ignores, in words: points and lines, animations, skins, morph targets and
+/// cameras.
 fn hidden(document: &Document) -> Vec<String> {
     let has_targets =
         |mesh: &gltf::Mesh<'_>| mesh.primitives().any(|part| part.morph_targets().len() > 0);
     let targets = document.meshes().filter(has_targets).count();
+    let parts = document.meshes().flat_map(|mesh| mesh.primitives());
+    let without_triangles = parts.filter(|part| !has_triangles(part.mode())).count();
     [
+        (without_triangles, "mesh of points or lines", "meshes of points or lines"),
         (document.animations().len(), "animation", "animations"),
         (document.skins().len(), "skin", "skins"),
         (targets, "mesh with morph targets", "meshes with morph targets"),
@@ -104,16 +111,23 @@ fn check_version(version: &str) -> Result<()> {
     Ok(())
 }
 
+/// Returns the error of a file that the crate refuses, in one sentence.
+fn invalid(error: &gltf::Error) -> Error {
+    // The crate ends each of several reasons with a semicolon.
+    let text = error.to_string();
+    let reason = text.trim_start_matches("invalid glTF:").trim_end_matches(';').trim();
+    anyhow!("{INVALID}: {reason}")
+}
+
 /// Parses and checks a file. [`QUANTIZED`] and extensions that change how surfaces look are allowed even if the file
 /// requires them.
 fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
-    let cannot = "it is not a valid glTF file";
     // Bytes 8 to 11 of a binary file are its length.
     if let Some([b'g', b'l', b'T', b'F', _, _, _, _, a, b, c, d]) = bytes.first_chunk() {
         let (needed, there) = (u32::from_le_bytes([*a, *b, *c, *d]), bytes.len());
         let is_whole = there as u64 >= u64::from(needed);
         ensure!(is_whole, "it is cut off: it has {there} bytes of {needed}");
-        ensure!(needed >= 12, "{cannot}: its header takes more than its {needed} bytes");
+        ensure!(needed >= 12, "{INVALID}: its header takes more than its {needed} bytes");
     }
     let parsed = Gltf::from_slice_without_validation(bytes);
     // Files of glTF 1 are objects where those of glTF 2 are arrays.
@@ -123,7 +137,7 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     {
         check_version(version)?;
     }
-    let Gltf { document, blob } = parsed.context(cannot)?;
+    let Gltf { document, blob } = parsed.map_err(|error| invalid(&error))?;
     let mut root = document.into_json();
     check_version(root.asset.min_version.as_ref().unwrap_or(&root.asset.version))?;
     let is_read =
@@ -139,9 +153,9 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     let mut named = primitives.flat_map(|primitive| primitive.attributes.values());
     ensure!(
         named.all(|accessor| accessor.value() < root.accessors.len()),
-        "{cannot}: a mesh names an accessor that is not there"
+        "{INVALID}: a mesh names an accessor that is not there"
     );
-    Ok((Document::from_json(root).context(cannot)?, blob))
+    Ok((Document::from_json(root).map_err(|error| invalid(&error))?, blob))
 }
 
 /// Reads all buffers: the binary part of the file, files beside it, or text in it.
@@ -178,10 +192,15 @@ fn buffers(document: &Document, mut blob: Option<Vec<u8>>, folder: &Path) -> Res
         .collect()
 }
 
+/// Returns true for primitives of triangles, false for points and lines.
+const fn has_triangles(mode: Mode) -> bool {
+    matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
+}
+
 /// Returns the triangles of a primitive, or `None` if it has points or lines.
 fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Mesh>> {
     let mode = primitive.mode();
-    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+    if !has_triangles(mode) {
         return Ok(None);
     }
     let accessor = primitive.get(&Semantic::Positions).context("it has no positions")?;
@@ -426,9 +445,10 @@ mod tests {
             "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}], "asset""#;
         let model = read_text(&text.replacen(r#""asset""#, more, 1)).unwrap();
         let expected =
-            "a.glb: not shown: 2 animations, 1 skin, 1 mesh with morph targets, 1 camera";
-        assert_eq!(model.hidden_in("a.glb"), [expected]);
-        assert!(read_text(&as_text()).unwrap().hidden_in("a.glb").is_empty());
+            "1 mesh of points or lines, 2 animations, 1 skin, 1 mesh with morph targets, 1 camera";
+        assert_eq!(model.hidden_in("a.glb"), [format!("a.glb: not shown: {expected}")]);
+        let all_shown = as_text().replacen(r#""mode": 0"#, r#""mode": 4"#, 1);
+        assert!(read_text(&all_shown).unwrap().hidden_in("a.glb").is_empty());
     }
 
     #[test]
@@ -516,7 +536,7 @@ mod tests {
                 r#""extensionsRequired": ["KHR_draco_mesh_compression"], "asset""#,
                 "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
-            (r#""mesh": 0"#, r#""mesh": 8"#, "not a valid glTF file"),
+            (r#""mesh": 0"#, r#""mesh": 8"#, "file: nodes[0].mesh: Index out of bounds"),
             (
                 r#""2.0""#,
                 r#""1.0""#,
@@ -525,7 +545,7 @@ mod tests {
             (r#""2.0""#, r#""2.0", "minVersion": "3.0""#, "it is of glTF 3.0"),
             (r#""2.0"}, "scene": 0"#, r#""1.0"}, "scene": "a""#, "it is of glTF 1.0"),
             (r#""POSITION": 0"#, r#""POSITION": 2"#, "a mesh names an accessor that is not there"),
-            ("{", "[", "not a valid glTF file"),
+            ("{", "[", "it is not a valid glTF file: "),
         ] {
             let message = format!("{:#}", read_text(&text.replacen(from, to, 1)).unwrap_err());
             assert!(message.contains(expected), "{message}");

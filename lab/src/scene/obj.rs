@@ -1,18 +1,21 @@
 //! OBJ files: all objects and groups of the file as one mesh.
 //!
-//! The reader takes the lines that start with `v` and `f`, and ignores materials, normals, texture
-//! coordinates, points and lines. Its errors name the line, which the crates for this format do not.
+//! The reader takes the lines that start with `v` and `f`, and ignores materials, normals and texture
+//! coordinates. It counts elements other than faces, of which the model tells. Its errors name the line, which
+//! the crates for this format do not.
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::Mesh;
+use super::{Mesh, Model};
+use crate::plural::counted;
 
 /// Reads a file.
 ///
 /// # Errors
 /// If a line does not match its first word, or a face names a vertex that the file does not have.
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
+pub(super) fn read(bytes: &[u8]) -> Result<Model> {
     let mut mesh = Mesh::default();
+    let mut others = 0;
     // The largest index so far and its line: a face may come before its vertices.
     let mut largest = (0, 0);
     let mut corners = Vec::new();
@@ -36,6 +39,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
                 let fan = rest.windows(2).map(|side| [*first, side[0], side[1]]);
                 mesh.indices.extend(fan);
             }),
+            "p" | "l" | "curv" | "curv2" | "surf" => {
+                others += 1;
+                Ok(())
+            }
             _ if keyword.contains(|c: char| c.is_ascii_control()) => {
                 Err(anyhow::anyhow!("it is not text"))
             }
@@ -54,7 +61,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
         count > 0 || bytes.trim_ascii().is_empty(),
         "it has no line that starts with `v`: it is not an OBJ file, or has no vertices"
     );
-    Ok(mesh)
+    let mut model = Model::from(mesh);
+    if others > 0 {
+        let elements = counted(others, "element", "elements");
+        model.hidden.push(format!("{elements} of points, lines, curves or surfaces"));
+    }
+    Ok(model)
 }
 
 /// Reads the coordinates of a vertex. A weight or a colour may follow.
@@ -131,31 +143,40 @@ mod tests {
         format!("{:#}", read(text).unwrap_err())
     }
 
+    fn mesh(text: &[u8]) -> Mesh {
+        read(text).unwrap().meshes.remove(0)
+    }
+
     #[test]
     fn objects_become_one_mesh_and_quads_two_triangles() {
         let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\r\nv 1 1 0 0.5 0.5 0.5\nv\t0 1 0\nvn 0 0 1\n\
                     f 1//1 2//1 \\\n 3//1 4//1\no b\nv 0 0 1\nusemtl x\nf -1 1 2\np 1\nl 1 2\n#\n\n";
-        let mesh = read(text.as_bytes()).unwrap();
+        let mesh = mesh(text.as_bytes());
         assert_eq!(mesh.positions.len(), 5);
         assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [4, 0, 1]]);
-        assert_eq!(read(b"\n").unwrap(), Mesh::default());
+        assert_eq!(read(b"\n").unwrap(), Mesh::default().into());
+        let hidden = read(text.as_bytes()).unwrap().hidden;
+        assert_eq!(hidden, ["2 elements of points, lines, curves or surfaces"]);
+        let one = read(b"v 0 0 0\nv 1 0 0\nl 1 2\n").unwrap().hidden;
+        assert_eq!(one, ["1 element of points, lines, curves or surfaces"]);
     }
 
     #[test]
     fn marks_and_letters_of_encodings_are_no_part_of_a_mesh() {
         let text = b"v 0 0 0\n# Gr\xf6\xdfe\nv 1 0 0\no W\xfcrfel\nv 0 1 0\nf 1 2 3\n";
-        let mesh = read(text).unwrap();
+        let mesh = mesh(text);
         assert_eq!((mesh.positions.len(), &*mesh.indices), (3, &[[0, 1, 2]][..]));
-        assert_eq!(read(&[b"\xef\xbb\xbf", &text[..]].concat()).unwrap(), mesh);
+        assert_eq!(read(&[b"\xef\xbb\xbf", &text[..]].concat()).unwrap(), mesh.into());
     }
 
     #[test]
     fn lines_may_end_as_on_any_system() {
         let text = "v 0 0 0\nv 1 0 0\n\nv 0 1 0\nf 1 \\\n2 3\n";
-        let mesh = read(text.as_bytes()).unwrap();
+        let mesh = mesh(text.as_bytes());
         assert_eq!(mesh.indices, [[0, 1, 2]]);
+        let model = Model::from(mesh);
         for end in ["\r", "\r\n"] {
-            assert_eq!(read(text.replace('\n', end).as_bytes()).unwrap(), mesh, "{end:?}");
+            assert_eq!(read(text.replace('\n', end).as_bytes()).unwrap(), model, "{end:?}");
             let wrong = format!("{text}f 1 2 4\n").replace('\n', end);
             assert_eq!(message(wrong.as_bytes()), "line 7: there is no vertex 4, the file has 3");
         }

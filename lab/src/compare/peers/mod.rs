@@ -131,8 +131,8 @@ pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
 #[cfg(not(feature = "embree"))]
 pub fn systems(_: &[Peer]) -> Result<Vec<Box<dyn System>>> {
     anyhow::bail!(
-        "this program was built without the other ray tracers. On Debian: \
-         apt-get install libembree-dev g++, then \
+        "this program was built without the other ray tracers (`hgrid table` measures without them). On \
+         Debian: apt-get install libembree-dev g++, then RUSTFLAGS='-C target-cpu=native' \
          cargo run --release -p hgrid-lab --features peers -- compare ... \
          (with --features embree for Embree alone, which needs no C++ compiler)"
     )

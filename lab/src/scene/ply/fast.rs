@@ -115,15 +115,16 @@ impl FaceLayout {
         (before + behind <= MAX_BYTES).then_some(Self { before, behind, is_signed, vertex_count })
     }
 
-    /// Reads all faces, as triangle fans around their first corners.
+    /// Reads all faces, as triangle fans around their first corners, and returns the number of those that give no
+    /// triangle.
     pub(super) fn read(
         &self,
         source: &mut impl BufRead,
         element: &ElementDef,
         triangles: &mut Vec<[u32; 3]>,
-    ) -> Result<()> {
+    ) -> Result<usize> {
         let triangle_bytes = self.before + 1 + 12 + self.behind;
-        let mut done = 0;
+        let (mut done, mut without_triangle) = (0, 0);
         let mut face = Vec::new();
         while done < element.count {
             // Take successive triangles from the buffer.
@@ -151,6 +152,7 @@ impl FaceLayout {
             read(self.before + 1, &mut face)?;
             let count = usize::from(face.last().copied().unwrap_or(0));
             read(4 * count + self.behind, &mut face)?;
+            without_triangle += usize::from(count < 3);
             if let Some(corners) = face.get(..4 * count) {
                 for at in 2..count {
                     let fan = [0, at - 1, at].map(|at| &corners[4 * at..4 * at + 4]);
@@ -159,7 +161,7 @@ impl FaceLayout {
             }
             done += 1;
         }
-        Ok(())
+        Ok(without_triangle)
     }
 
     /// Decodes three corners.

@@ -11,14 +11,15 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 
-use anyhow::{Context as _, Error, Result, anyhow, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, bail, ensure};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult,
 };
 
 use self::fast::{FaceLayout, VertexLayout};
-use super::Mesh;
+use super::{Mesh, Model};
+use crate::plural::counted;
 use crate::progress::Progress;
 
 /// Bytes per read: enough that system calls cost next to nothing.
@@ -28,7 +29,7 @@ const BUFFER_BYTES: usize = 1 << 20;
 ///
 /// # Errors
 /// If the file cannot be opened, is not PLY, ends too early, or declares no vertices.
-pub(super) fn load(path: &Path) -> Result<Mesh> {
+pub(super) fn load(path: &Path) -> Result<Model> {
     let file = File::open(path).context("cannot open it")?;
     let byte_count = file.metadata().context("cannot read its size")?.len();
     let reader = Progress::new("loading", byte_count).reader(file);
@@ -36,15 +37,20 @@ pub(super) fn load(path: &Path) -> Result<Mesh> {
 }
 
 /// Reads a PLY of at most `byte_count` bytes, a number that only limits the memory reserved in advance.
-fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
+fn read(mut source: impl BufRead, byte_count: u64) -> Result<Model> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
     let mut reader = Reader::new(source);
     // After its first line, the parser's error describes its own state.
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|error| {
-        let text = error.to_string();
-        anyhow!("its header is damaged: {}", text.lines().next().unwrap_or_default())
-    })?;
+    let header = match Parser::<Skipped>::new().read_header(&mut reader) {
+        Ok(header) => header,
+        Err(error) => {
+            let is_at_end = reader.into_inner().fill_buf()?.is_empty();
+            ensure!(!is_at_end, "it is cut off within its header: fetch or export it again");
+            let text = error.to_string();
+            bail!("its header is damaged: {}", text.lines().next().unwrap_or_default())
+        }
+    };
     let vertices = header.elements.get("vertex").map(|vertex| vertex.count);
     let vertex_count = vertices.context("its header declares no `vertex` element")?;
     ensure!(
@@ -58,6 +64,8 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
     let mut place = Place { encoding: header.encoding, line };
     let mut source = reader.into_inner();
     let mut mesh = Mesh::default();
+    // Faces that give no triangle.
+    let mut without_triangle = 0;
     for element in header.elements.values() {
         // Elements without bytes would let a header promise endless work.
         ensure!(!element.properties.is_empty(), "its `{}` elements are empty", element.name);
@@ -79,8 +87,11 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
                 check_face(element)?;
                 mesh.indices.reserve_exact(count);
                 match FaceLayout::of(element, vertex_count).filter(|_| is_little) {
-                    Some(layout) => layout.read(&mut source, element, &mut mesh.indices)?,
+                    Some(layout) => {
+                        without_triangle += layout.read(&mut source, element, &mut mesh.indices)?;
+                    }
                     None => each(&mut source, &mut place, element, |face: Face| {
+                        without_triangle += usize::from(face.0.len() < 3);
                         face.fan(vertex_count, &mut mesh.indices)
                     })?,
                 }
@@ -88,7 +99,12 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
             _ => each(&mut source, &mut place, element, |_: Skipped| Ok(()))?,
         }
     }
-    Ok(mesh)
+    let mut model = Model::from(mesh);
+    if without_triangle > 0 {
+        let faces = counted(without_triangle, "face", "faces");
+        model.hidden.push(format!("{faces} of fewer than three corners"));
+    }
+    Ok(model)
 }
 
 /// The part of a file that was read: its encoding, and the lines of text so far.
@@ -298,7 +314,9 @@ mod tests {
     }
 
     fn read_all(bytes: &[u8]) -> Result<Mesh> {
-        read(bytes, bytes.len() as u64)
+        let mut model = read(bytes, bytes.len() as u64)?;
+        assert_eq!((model.meshes.len(), model.instances.len()), (1, 1));
+        Ok(model.meshes.remove(0))
     }
 
     fn message(bytes: &[u8]) -> String {
@@ -323,7 +341,7 @@ mod tests {
     #[test]
     fn buffers_of_any_size_give_one_mesh() {
         let file = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
-        let expected = read_all(&file).unwrap();
+        let expected = read(&*file, file.len() as u64).unwrap();
         for capacity in 3..60 {
             let source = BufReader::with_capacity(capacity, &*file);
             assert_eq!(read(source, file.len() as u64).unwrap(), expected);
@@ -344,7 +362,10 @@ mod tests {
             }
             bytes
         };
-        let mesh = read_all(&file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0]])).unwrap();
+        let bytes = file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0]]);
+        let hidden = read(&*bytes, bytes.len() as u64).unwrap().hidden;
+        assert_eq!(hidden, ["1 face of fewer than three corners"]);
+        let mesh = read_all(&bytes).unwrap();
         assert_eq!(mesh.positions, VERTICES);
         assert_eq!(mesh.indices, [[0, 1, 2], [1, 3, 0]]);
         let far = message(&file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0, 4]]));
@@ -354,6 +375,17 @@ mod tests {
         let expected =
             "`face` element 1: there is no vertex -2, the file has 4, which count from 0";
         assert_eq!(message, expected);
+    }
+
+    #[test]
+    fn faces_without_a_triangle_are_told_of_in_any_encoding() {
+        let text = String::from_utf8(ascii()).unwrap();
+        let read = |text: &str| read(text.as_bytes(), text.len() as u64).unwrap();
+        assert!(read(&text).hidden.is_empty());
+        let fewer = text.replacen("4 0 1 2 3 9\n3 3 2 1 9\n", "2 0 1 9\n0 9\n", 1);
+        let model = read(&fewer);
+        assert!(model.meshes[0].indices.is_empty());
+        assert_eq!(model.hidden, ["2 faces of fewer than three corners"]);
     }
 
     #[test]
@@ -381,6 +413,10 @@ mod tests {
         for length in 0..file.len() - 1 {
             let message = message(&file[..length]);
             assert!(!message.is_empty());
+        }
+        for length in 4..file.windows(10).position(|it| it == b"end_header").unwrap() {
+            let expected = "it is cut off within its header: fetch or export it again";
+            assert_eq!(message(&file[..length]), expected, "{length}");
         }
         let cut = message(&file[..file.len() - 8]);
         assert_eq!(cut, "it is cut off after 1 of 2 `face` elements: fetch or export it again");
