@@ -230,6 +230,14 @@ fn the_point_of_a_triangle_is_the_closest_one() {
     }
     let fibonacci = [[0.0, 0.0], [14_930_352.0, 9_227_465.0], [9_227_465.0, 5_702_887.0]]
         .map(|[x, y]: [f32; 2]| [x / 8_388_608.0, y / 8_388_608.0, 0.0]);
+    let narrow = (
+        [
+            [-3.2937e-10, -9.720_700_6e-11, -3.2937e-10],
+            [0.873_772, 0.637_119_8, 0.873_772],
+            [0.818_412_54, 0.596_753_9, 0.818_412_54],
+        ],
+        [0.683_207_15, 0.490_193_6, 0.661_335_7],
+    );
     let mut random = Random(5);
     for round in 0..10_000 {
         let mut corner = || random.point().map(|c| (c * 4.0).round() / 4.0);
@@ -248,6 +256,8 @@ fn the_point_of_a_triangle_is_the_closest_one() {
             5 => triangle[2] = std::array::from_fn(|k| a[k] + 1e-4 * part * c[k]),
             // Corners of Fibonacci numbers: this triangle is 2^-48 as high as long.
             6 => triangle = fibonacci,
+            // 2^-42 as high as long: the place below the point is off by 2^-13 of the length, and seems to lie inside.
+            7 => (triangle, point) = narrow,
             _ => {}
         }
         triangle.rotate_left(round / 10 % 3);
