@@ -98,7 +98,7 @@ impl Format {
         Ok(match self {
             Self::Ply => ply::load(path)?,
             Self::Obj => obj::read(&bytes()?)?,
-            Self::Stl => stl::read(&bytes()?)?.into(),
+            Self::Stl => stl::read(&bytes()?)?,
             Self::Gltf => gltf::read(&bytes()?, path)?,
             Self::Blob => packed::load(path)?.into(),
         })

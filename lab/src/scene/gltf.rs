@@ -8,6 +8,7 @@ mod accessor;
 
 use core::ops::Range;
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Error, Result, anyhow, bail, ensure};
@@ -20,7 +21,8 @@ use gltf::{Document, Gltf, Primitive, Semantic};
 use self::accessor::{check_sparse, is_inside, positions};
 use super::format::Format;
 use super::model::{IDENTITY, Mesh, Model, Transform};
-use crate::plural::counted;
+use crate::file;
+use crate::plural::{counted, noun};
 use crate::vector::round;
 
 /// A matrix in `f64`, so that the product of a chain of nodes is rounded once.
@@ -39,8 +41,8 @@ const LOOKS: [&str; 6] = [
 /// The extension of positions that are whole numbers of 8 or 16 bits.
 const QUANTIZED: &str = "KHR_mesh_quantization";
 
-/// The start of the message for a file that breaks a rule of the format.
-const INVALID: &str = "it is not a valid glTF file";
+/// The start of the message for a file that the crate refuses, mostly because it breaks a rule of the format.
+const INVALID: &str = "it is no glTF that hgrid reads";
 
 /// Reads the bytes of a file, and the files that it names beside it.
 ///
@@ -83,8 +85,8 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
-/// Counts what the file has and this reader ignores, in words: points and lines, animations, skins, morph targets and
-/// cameras.
+/// Counts what the file has and this reader ignores, in words: points and lines, animations, skins, morph targets,
+/// cameras and extensions.
 fn hidden(document: &Document) -> Vec<String> {
     let has_targets =
         |mesh: &gltf::Mesh<'_>| mesh.primitives().any(|part| part.morph_targets().len() > 0);
@@ -101,7 +103,20 @@ fn hidden(document: &Document) -> Vec<String> {
     .into_iter()
     .filter(|&(count, ..)| count > 0)
     .map(|(count, one, many)| counted(count, one, many))
+    .chain(of_extensions(document))
     .collect()
+}
+
+/// Names the extensions that may add to what is shown, and are neither read nor required.
+fn of_extensions(document: &Document) -> Option<String> {
+    let unknown: Vec<_> = document.extensions_used().filter(|name| !is_known(name)).collect();
+    let extensions = noun(unknown.len(), "extension", "extensions");
+    (!unknown.is_empty()).then(|| format!("{extensions} {}", unknown.join(", ")))
+}
+
+/// Returns true for an extension that is read, or changes only how surfaces look.
+fn is_known(extension: &str) -> bool {
+    extension == QUANTIZED || LOOKS.iter().any(|start| extension.starts_with(start))
 }
 
 /// Refuses versions of glTF other than 2: their files have the same endings.
@@ -122,6 +137,8 @@ fn invalid(error: &gltf::Error) -> Error {
 /// Parses and checks a file. [`QUANTIZED`] and extensions that change how surfaces look are allowed even if the file
 /// requires them.
 fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
+    // Some editors write a mark of the encoding first.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     // Bytes 8 to 11 of a binary file are its length.
     if let Some([b'g', b'l', b'T', b'F', _, _, _, _, a, b, c, d]) = bytes.first_chunk() {
         let (needed, there) = (u32::from_le_bytes([*a, *b, *c, *d]), bytes.len());
@@ -140,9 +157,7 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     let Gltf { document, blob } = parsed.map_err(|error| invalid(&error))?;
     let mut root = document.into_json();
     check_version(root.asset.min_version.as_ref().unwrap_or(&root.asset.version))?;
-    let is_read =
-        |name: &String| name == QUANTIZED || LOOKS.iter().any(|start| name.starts_with(start));
-    root.extensions_required.retain(|name| !is_read(name));
+    root.extensions_required.retain(|name| !is_known(name));
     if let Some(name) = root.extensions_required.first() {
         bail!(
             "it requires the extension {name}, which hgrid does not read: export it without that"
@@ -161,6 +176,7 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
 /// Reads all buffers: the binary part of the file, files beside it, or text in it.
 fn buffers(document: &Document, mut blob: Option<Vec<u8>>, folder: &Path) -> Result<Vec<Vec<u8>>> {
     let mut read = |buffer: gltf::Buffer<'_>| {
+        let length = buffer.length();
         let bytes = match buffer.source() {
             Source::Bin => blob.take().context("the file has no binary part")?,
             Source::Uri(uri) => match uri.strip_prefix("data:") {
@@ -171,15 +187,22 @@ fn buffers(document: &Document, mut blob: Option<Vec<u8>>, folder: &Path) -> Res
                         .decode(text)
                         .context("its text is not base64")?
                 }
-                None if uri.contains(':') => bail!("`{uri}` is not a file: fetch it first"),
+                None if uri.contains(':') => {
+                    bail!("`{uri}` is an address: put the file beside this one, and name it here")
+                }
                 None => {
-                    let file =
+                    let path =
                         folder.join(&*urlencoding::decode(uri).context("its name is not text")?);
-                    fs::read(&file).with_context(|| format!("cannot read `{}`", file.display()))?
+                    let cannot = || format!("cannot read `{}`", path.display());
+                    let mut bytes = Vec::new();
+                    // No more than the buffer needs: the file may be larger than memory.
+                    let file = file::open(&path).with_context(cannot)?;
+                    file.take(length as u64).read_to_end(&mut bytes).with_context(cannot)?;
+                    bytes
                 }
             },
         };
-        let (length, there) = (buffer.length(), bytes.len());
+        let there = bytes.len();
         ensure!(there >= length, "it has {there} bytes of {length}");
         Ok(bytes)
     };
@@ -428,6 +451,35 @@ mod tests {
     }
 
     #[test]
+    fn extensions_that_are_not_read_are_told_of() {
+        let used =
+            r#""extensionsUsed": ["KHR_materials_unlit", "EXT_mesh_gpu_instancing"], "asset""#;
+        let text = as_text().replacen(r#""mode": 0"#, r#""mode": 4"#, 1);
+        let hidden = read_text(&text.replacen(r#""asset""#, used, 1)).unwrap().hidden;
+        assert_eq!(hidden, ["extension EXT_mesh_gpu_instancing"]);
+        let model = read_text(&format!("\u{feff}{text}")).unwrap();
+        assert!(model.hidden.is_empty());
+    }
+
+    /// Only the bytes of a buffer are read from the file that it names, and only from a file.
+    #[test]
+    fn buffers_are_read_as_far_as_they_go() {
+        let folder = std::env::temp_dir().join(format!("hgrid-gltf-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("scene.gltf");
+        let of = |name: &str| read(json(&format!(r#""uri": "{name}""#)).as_bytes(), &path);
+        fs::write(folder.join("long.bin"), [bytes(), vec![7; 99]].concat()).unwrap();
+        assert_eq!(of("long.bin").unwrap(), read_text(&as_text()).unwrap());
+        let message = format!("{:#}", of("..").unwrap_err());
+        assert!(message.ends_with("it is a folder: name a file in it"), "{message}");
+        if cfg!(unix) {
+            let message = format!("{:#}", of("/dev/zero").unwrap_err());
+            assert!(message.contains("it is a pipe or a device"), "{message}");
+        }
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
     fn extensions_for_looks_are_no_hindrance() {
         let names =
             r#""extensionsRequired": ["KHR_materials_unlit", "KHR_texture_basisu"], "asset""#;
@@ -501,7 +553,7 @@ mod tests {
         let text = as_text();
         for (from, to, expected) in [
             ("data:application", "mesh.bin?", "buffer 0: cannot read `no/such/mesh.bin"),
-            ("data:", "https:", "is not a file: fetch it first"),
+            ("data:", "https:", "is an address: put the file beside this one"),
             (";base64,", ";base64,!", "buffer 0: its text is not base64"),
             (r#""byteLength": 54"#, r#""byteLength": 99"#, "buffer 0: it has 54 bytes of 99"),
             (
@@ -536,7 +588,7 @@ mod tests {
                 r#""extensionsRequired": ["KHR_draco_mesh_compression"], "asset""#,
                 "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
-            (r#""mesh": 0"#, r#""mesh": 8"#, "file: nodes[0].mesh: Index out of bounds"),
+            (r#""mesh": 0"#, r#""mesh": 8"#, "hgrid reads: nodes[0].mesh: Index out of bounds"),
             (
                 r#""2.0""#,
                 r#""1.0""#,
@@ -545,7 +597,7 @@ mod tests {
             (r#""2.0""#, r#""2.0", "minVersion": "3.0""#, "it is of glTF 3.0"),
             (r#""2.0"}, "scene": 0"#, r#""1.0"}, "scene": "a""#, "it is of glTF 1.0"),
             (r#""POSITION": 0"#, r#""POSITION": 2"#, "a mesh names an accessor that is not there"),
-            ("{", "[", "it is not a valid glTF file: "),
+            ("{", "[", "it is no glTF that hgrid reads: "),
         ] {
             let message = format!("{:#}", read_text(&text.replacen(from, to, 1)).unwrap_err());
             assert!(message.contains(expected), "{message}");

@@ -25,11 +25,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model> {
     let mut lines = Lines { rest: bytes, number: 0 };
     while let Some(line) = lines.next() {
         let number = lines.number;
-        let line = if line.ends_with(b"\\") { lines.join(line, &mut joined) } else { line };
+        let line = if is_element(line) { lines.join(line, &mut joined) } else { line };
         // Names and comments may be in any encoding.
         let line = String::from_utf8_lossy(line);
         let line = line.trim_ascii();
         let (keyword, words) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+        let words = words.split('#').next().unwrap_or_default();
         let result = match keyword {
             "v" => vertex(words).map(|vertex| mesh.positions.push(vertex)),
             "f" => face(words, mesh.positions.len(), &mut corners).map(|()| {
@@ -67,6 +68,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model> {
         model.hidden.push(format!("{elements} of points, lines, curves or surfaces"));
     }
     Ok(model)
+}
+
+/// Returns true for a line with a vertex or a face, which may go on in the next line. Names and comments may end in a
+/// backslash, too.
+fn is_element(line: &[u8]) -> bool {
+    matches!(line.trim_ascii_start(), [b'v' | b'f', b' ' | b'\t', ..])
 }
 
 /// Reads the coordinates of a vertex. A weight or a colour may follow.
@@ -122,14 +129,14 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Joins a line that ends in a backslash with those that follow.
+    /// Joins a line with the next one as long as it ends in a backslash.
     fn join<'j>(&mut self, line: &[u8], joined: &'j mut Vec<u8>) -> &'j [u8] {
         joined.clear();
-        joined.extend_from_slice(line);
+        joined.extend_from_slice(line.trim_ascii_end());
         while joined.last() == Some(&b'\\') {
             joined.pop();
             joined.push(b' ');
-            joined.extend_from_slice(self.next().unwrap_or_default());
+            joined.extend_from_slice(self.next().unwrap_or_default().trim_ascii_end());
         }
         joined
     }
@@ -159,6 +166,13 @@ mod tests {
         assert_eq!(hidden, ["2 elements of points, lines, curves or surfaces"]);
         let one = read(b"v 0 0 0\nv 1 0 0\nl 1 2\n").unwrap().hidden;
         assert_eq!(one, ["1 element of points, lines, curves or surfaces"]);
+    }
+
+    #[test]
+    fn backslashes_and_comments_end_where_they_should() {
+        let text = b"# C:\\models\\\nv 0 0 0 # first\nv 1 0 0\nv 0 1 0\nusemtl a\\\nf 1 2 3#last\nf 1 2 \\ \n 3\n";
+        let mesh = mesh(text);
+        assert_eq!((mesh.positions.len(), &*mesh.indices), (3, &[[0, 1, 2]; 2][..]));
     }
 
     #[test]

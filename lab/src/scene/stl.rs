@@ -5,8 +5,8 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::Mesh;
-use crate::plural::triangles;
+use super::{Mesh, Model};
+use crate::plural::{counted, triangles};
 
 /// Bytes before the first triangle of a binary file: a comment and the triangle count.
 const HEADER_BYTES: usize = 84;
@@ -18,7 +18,7 @@ const TRIANGLE_BYTES: usize = 50;
 ///
 /// # Errors
 /// If the file is cut off, or a line of an ASCII file is malformed.
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
+pub(super) fn read(bytes: &[u8]) -> Result<Model> {
     let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
     let count = count.map(|count| u32::from_le_bytes(*count) as usize);
     let rest = bytes.get(HEADER_BYTES..).unwrap_or_default();
@@ -26,9 +26,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let head = bytes.get(..HEADER_BYTES).unwrap_or(bytes);
     let is_text = starts_with_solid(bytes) && !head.contains(&0);
     match count {
-        Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => Ok(binary(rest)),
+        Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => {
+            Ok(binary(rest).into())
+        }
         // The names of solids may be in any encoding.
-        _ if is_text => ascii(&String::from_utf8_lossy(bytes)),
+        _ if is_text => Ok(ascii(&String::from_utf8_lossy(bytes))?.into()),
         // Some programs write more bytes after the last triangle.
         Some(count) => {
             let present = rest.len() / TRIANGLE_BYTES;
@@ -37,7 +39,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
                 "it is cut off after {present} of {}, or it is not an STL file",
                 triangles(count)
             );
-            Ok(binary(&rest[..count * TRIANGLE_BYTES]))
+            let (counted_bytes, behind) = rest.split_at(count * TRIANGLE_BYTES);
+            let mut model = Model::from(binary(counted_bytes));
+            if behind.len() >= TRIANGLE_BYTES {
+                let bytes = counted(behind.len(), "byte", "bytes");
+                let triangles = triangles(count);
+                model.hidden.push(format!("{bytes} behind the {triangles} of its header"));
+            }
+            Ok(model)
         }
         None => bail!("it is not an STL file: it is too short, and does not start with `solid`"),
     }
@@ -63,9 +72,12 @@ pub(super) fn starts_with_solid(bytes: &[u8]) -> bool {
 fn ascii(text: &str) -> Result<Mesh> {
     let mut positions = Vec::new();
     let mut is_complete = true;
-    let mut lines = (1..).zip(text.lines()).peekable();
+    // Lines may end as those of old Macs do.
+    let ends = if text.contains('\n') { '\n' } else { '\r' };
+    let mut lines = (1..).zip(text.split_terminator(ends)).peekable();
+    let mut facet = 0;
     while let Some((number, line)) = lines.next() {
-        let result = read_line(line, &mut positions, &mut is_complete);
+        let result = read_line(line, &mut positions, &mut facet, &mut is_complete);
         // An incomplete file is cut off: say that, not what its last line lacks.
         let is_end = lines.peek().is_none();
         ensure!(
@@ -77,19 +89,26 @@ fn ascii(text: &str) -> Result<Mesh> {
     Ok(with_positions(positions))
 }
 
-/// Reads a line: a corner, or the start or the end of a solid or a facet.
-fn read_line(line: &str, positions: &mut Vec<[f32; 3]>, is_complete: &mut bool) -> Result<()> {
+/// Reads a line: a corner, or the start or the end of a solid or a facet. `facet` is the number of corners before the
+/// last facet.
+fn read_line(
+    line: &str,
+    positions: &mut Vec<[f32; 3]>,
+    facet: &mut usize,
+    is_complete: &mut bool,
+) -> Result<()> {
     let mut words = line.split_ascii_whitespace();
     let Some(first) = words.next() else { return Ok(()) };
     match &*first.to_ascii_lowercase() {
         "vertex" => {
-            let corner: Vec<f32> = words.flat_map(str::parse).collect();
-            let corner = <[f32; 3]>::try_from(corner).ok();
+            let corner: Option<Vec<f32>> = words.map(|word| word.parse().ok()).collect();
+            let corner = corner.and_then(|corner| <[f32; 3]>::try_from(corner).ok());
             positions.push(corner.context("`vertex` should have three numbers behind it")?);
         }
         "endfacet" => {
-            let is_whole = positions.len().is_multiple_of(3);
-            ensure!(is_whole, "a facet has three vertices, this one has not");
+            let count = positions.len() - *facet;
+            ensure!(count == 3, "a facet has three vertices, this one has {count}");
+            *facet = positions.len();
         }
         "solid" => *is_complete = false,
         "endsolid" => *is_complete = true,
@@ -129,6 +148,10 @@ mod tests {
     const TEXT: &str = "solid\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0.5\n   vertex 1 0 0\n\
         vertex 0 1e-3 0\n  endloop\n endfacet\nendsolid\n";
 
+    fn mesh(bytes: &[u8]) -> Mesh {
+        read(bytes).unwrap().meshes.remove(0)
+    }
+
     #[test]
     fn both_encodings_give_one_mesh() {
         for bytes in [
@@ -139,11 +162,24 @@ mod tests {
             &[file(b"", 1), vec![1; 9]].concat(),
             &[file(b"solid", 1), vec![1; 9]].concat(),
         ] {
-            let mesh = read(bytes).unwrap();
+            let mesh = mesh(bytes);
             assert_eq!((&*mesh.positions, &*mesh.indices), (&CORNERS[..], &[[0, 1, 2]][..]));
         }
-        assert_eq!(read(TEXT.repeat(3).as_bytes()).unwrap().indices.len(), 3);
-        assert_eq!(read(&file(b"", 0)).unwrap(), Mesh::default());
+        assert_eq!(mesh(TEXT.repeat(3).as_bytes()).indices.len(), 3);
+        assert_eq!(mesh(TEXT.replace('\n', "\r").as_bytes()), mesh(TEXT.as_bytes()));
+        assert_eq!(mesh(TEXT.replace('\n', "\r\n").as_bytes()), mesh(TEXT.as_bytes()));
+        assert_eq!(mesh(&file(b"", 0)), Mesh::default());
+    }
+
+    /// Some programs that write as they go leave the number of triangles zero.
+    #[test]
+    fn triangles_that_are_not_counted_are_told_of() {
+        let mut bytes = file(b"", 3);
+        bytes[80] = 1;
+        let model = read(&bytes).unwrap();
+        assert_eq!(model.meshes[0].indices.len(), 1);
+        assert_eq!(model.hidden, ["100 bytes behind the 1 triangle of its header"]);
+        assert!(read(&file(b"", 3)).unwrap().hidden.is_empty());
     }
 
     #[test]
@@ -161,7 +197,9 @@ mod tests {
         }
         for (from, to, expected) in [
             ("1e-3", "one", "line 6: `vertex` should have three numbers"),
-            ("vertex 1 0 0\n", "", "line 7: a facet has three vertices"),
+            ("vertex 1 0 0\n", "", "line 7: a facet has three vertices, this one has 2"),
+            ("vertex 1 0 0\n", "vertex 1 0 0\n  vertex 1 0 0\n", "this one has 4"),
+            ("vertex 1 0 0\n", "vertex 1 zero 0 0\n", "line 5: `vertex` should have three numbers"),
             ("outer loop", "inner loop", "line 3: `inner` is no word"),
             ("endsolid", "", "cut off"),
         ] {

@@ -14,7 +14,7 @@ use std::path::Path;
 use anyhow::{Context as _, Error, Result, anyhow, bail, ensure};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
-    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult,
+    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType,
 };
 
 use self::fast::{FaceLayout, VertexLayout};
@@ -40,6 +40,8 @@ pub(super) fn load(path: &Path) -> Result<Model> {
 fn read(mut source: impl BufRead, byte_count: u64) -> Result<Model> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
+    let is_old = matches!(source.fill_buf()?, [_, _, _, b'\r', next, ..] if *next != b'\n');
+    ensure!(!is_old, "its lines end in CR alone: save it with LF or CR LF");
     let mut reader = Reader::new(source);
     // After its first line, the parser's error describes its own state.
     let header = match Parser::<Skipped>::new().read_header(&mut reader) {
@@ -179,8 +181,10 @@ fn check_vertex(element: &ElementDef) -> Result<()> {
 
 fn check_face(element: &ElementDef) -> Result<()> {
     ensure!(
-        element.properties.keys().any(|name| is_corner_list(name)),
-        "its faces have no `vertex_indices`"
+        element.properties.iter().any(|(name, property)| {
+            is_corner_list(name) && matches!(property.data_type, PropertyType::List(..))
+        }),
+        "its faces have no list `vertex_indices`"
     );
     Ok(())
 }
@@ -259,7 +263,12 @@ impl PropertyAccess for Face {
     }
 
     fn begin_list_int(&mut self, name: &str, _: usize) -> BeginList<'_, i32> {
-        if is_corner_list(name) { BeginList::Fill(&mut self.0) } else { BeginList::UseSetter }
+        if !is_corner_list(name) {
+            return BeginList::UseSetter;
+        }
+        // A face may have lists of both names: the last one counts, in any encoding.
+        self.0.clear();
+        BeginList::Fill(&mut self.0)
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
@@ -389,6 +398,18 @@ mod tests {
     }
 
     #[test]
+    fn of_two_lists_of_corners_the_last_counts() {
+        let header = HEADER.replace(
+            "property uchar flags",
+            "property list uchar int vertex_index\nproperty uchar flags",
+        );
+        let text = format!(
+            "ply\nformat ascii {header}0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 1 4\n0\n3 0 1 2 3 1 2 3 9\n3 0 1 2 3 2 3 0 9\n"
+        );
+        assert_eq!(read_all(text.as_bytes()).unwrap().indices, [[1, 2, 3], [2, 3, 0]]);
+    }
+
+    #[test]
     fn every_number_type_is_understood() {
         let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty short y\n\
             property float32 z\nelement face 1\nproperty list int ushort vertex_index\nend_header\n\
@@ -426,6 +447,7 @@ mod tests {
     fn damage_is_reported() {
         assert!(message(b"hello\n").contains("not a PLY file"));
         assert!(message(b"").contains("not a PLY file"));
+        assert_eq!(message(b"ply\rformat"), "its lines end in CR alone: save it with LF or CR LF");
         let text = String::from_utf8(ascii()).unwrap();
         let broken = [
             (
@@ -446,7 +468,8 @@ mod tests {
                 "3 3 4 1 9",
                 "line 21, `face` element 1: there is no vertex 4, the file has 4",
             ),
-            ("vertex_indices", "corners", "no `vertex_indices`"),
+            ("vertex_indices", "corners", "no list `vertex_indices`"),
+            ("list uchar int vertex_indices", "int vertex_indices", "no list `vertex_indices`"),
             ("float z", "float w", "no `z`"),
             ("element vertex 4", "element point 4", "no `vertex` element"),
             ("format ascii 1.0", "format text 1.0", "header is damaged"),
