@@ -1487,8 +1487,9 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts, answers of a batch)
- * overlaps other such memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays.
+ * Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts) overlaps other such
+ * memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays. Answers of a batch are compared with
+ * its rays and its scratch alone: vertices and answers may lie in the same structs.
  */
 #define HGRID_ERROR_OVERLAP -4
 
@@ -2177,8 +2178,8 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
  * hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
  * side. Neither array needs any alignment, and bytes between elements are neither read nor written.
- * No hit may overlap a ray, nor anything else that the call uses; if the two arrays interleave, their
- * strides must be equal.
+ * No hit may overlap a ray, nor anything else that the call uses, such as blob and mesh, which the call
+ * does not check; if rays and hits interleave, their strides must be equal.
  *
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
  * the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
@@ -2458,7 +2459,8 @@ hgrid_status hgrid_inspect(const struct hgrid_grid *grid, struct hgrid_statistic
  * Memory is that of a build of as many triangles: `HGRID_INDEX_BOUND`, `HGRID_SCRATCH_BOUND`, `hgrid_bound`. The
  * method is `HGRID_METHOD_BVH`; quality, tasks and progress are as for a mesh.
  *
- * `boxes`, `index`, `scratch` and `shapes` may not be NULL; `config` may be: the defaults. `report` may be NULL.
+ * `boxes` and `shapes` may not be NULL; `config` may be: the defaults. `index` and `scratch` may be NULL if their size
+ * is 0. `report` may be NULL.
  * Returns `HGRID_OK` and writes the view to `shapes`; or returns the reason and leaves `shapes` as it was:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
  *   `HGRID_ERROR_OVERLAP`;
@@ -2514,7 +2516,8 @@ hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
  * scratch.
  *
  * Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
- * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, or `HGRID_ERROR_NULL_ARGUMENT`.
+ * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes or masks, or
+ * `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
  */
@@ -2695,7 +2698,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * }
  * ```
  *
- * `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
+ * `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be if their size is 0;
+ * `scene` may not be NULL.
  * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
  * writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
@@ -2785,8 +2789,9 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
  * copies everything, and compares each object with every other.
  *
  * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
- * cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
+ * cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`
+ * (also for a cleared view of a grid among the objects), `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
  * or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
  * needed is not touched.
  *

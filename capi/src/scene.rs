@@ -304,7 +304,8 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// }
 /// ```
 ///
-/// `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
+/// `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be if their size is 0;
+/// `scene` may not be NULL.
 /// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
 /// writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
@@ -442,8 +443,9 @@ pub unsafe extern "C" fn hgrid_validate_scene(
 /// copies everything, and compares each object with every other.
 ///
 /// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
-/// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
+/// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`
+/// (also for a cleared view of a grid among the objects), `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
 /// or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
 /// needed is not touched.
 ///

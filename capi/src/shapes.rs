@@ -91,7 +91,8 @@ impl From<hgrid_shape_hit> for ShapeHit {
 /// Memory is that of a build of as many triangles: `HGRID_INDEX_BOUND`, `HGRID_SCRATCH_BOUND`, `hgrid_bound`. The
 /// method is `HGRID_METHOD_BVH`; quality, tasks and progress are as for a mesh.
 ///
-/// `boxes`, `index`, `scratch` and `shapes` may not be NULL; `config` may be: the defaults. `report` may be NULL.
+/// `boxes` and `shapes` may not be NULL; `config` may be: the defaults. `index` and `scratch` may be NULL if their size
+/// is 0. `report` may be NULL.
 /// Returns `HGRID_OK` and writes the view to `shapes`; or returns the reason and leaves `shapes` as it was:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
 ///   `HGRID_ERROR_OVERLAP`;
@@ -184,7 +185,8 @@ pub unsafe extern "C" fn hgrid_refit_shapes(
 /// scratch.
 ///
 /// Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
-/// zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, or `HGRID_ERROR_NULL_ARGUMENT`.
+/// zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes or masks, or
+/// `HGRID_ERROR_NULL_ARGUMENT`.
 ///
 /// Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
 ///

@@ -147,7 +147,7 @@ static void what_is_refused(void)
     /* Blobs of other content. */
     uint64_t bytes;
     hgrid_scene view;
-    hgrid_grid none;
+    hgrid_grid none = HGRID_GRID_INIT;
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack(&grid, NULL, 0, &bytes));
     void *packed = guarded((size_t)bytes);
     EXPECT(HGRID_OK, hgrid_pack(&grid, packed, (size_t)bytes, &bytes));
@@ -167,6 +167,23 @@ static void what_is_refused(void)
     EXPECT(HGRID_ERROR_MISALIGNED, hgrid_pack_scene(&scene, copy + 8, n, &bytes));
     const hgrid_scene zeros = HGRID_SCENE_INIT;
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&zeros, copy, n, &bytes));
+
+    /* A view that was cleared, behind one that was not: nothing is written, and no size is told. */
+    hgrid_grid cleared = grid;
+    hgrid_object pair[2];
+    hgrid_instance both[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
+    both[1].object = 1;
+    EXPECT(HGRID_OK, hgrid_object_grid(&grid, &pair[0]));
+    EXPECT(HGRID_OK, hgrid_object_grid(&cleared, &pair[1]));
+    EXPECT(HGRID_OK, hgrid_build_scene(both, 2, pair, 2, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
+                                       SCRATCH_BYTES, &view, NULL));
+    cleared = none;
+    memset(copy, 3, n);
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, NULL, 0, &bytes));
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, copy, n, &bytes));
+    for (size_t i = 0; i < n; i++)
+        CHECK(copy[i] == 3);
+    CHECK(bytes == 7);
 
     /* The test of a shape is code, which cannot be stored. */
     static const float box[6] = {0, 0, 0, 1, 1, 1};

@@ -99,6 +99,7 @@ static void what_shapes_refuse(void)
     EXPECT(HGRID_OK, hgrid_open_shapes(copy, shape_bytes, &boxes, &view));
     EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate_shapes(&view, scratch, SCRATCH_BYTES));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, copy, 64));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, (void *)(uintptr_t)boxes.boxes, 4));
 }
 
 static void what_scenes_refuse(void)

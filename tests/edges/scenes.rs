@@ -149,9 +149,46 @@ fn scenes_of_nothing_are_never_hit() {
             assert_eq!(scene.intersect(&ray), None);
             assert!(!scene.occluded(&ray));
         }
-        assert_eq!(scene.triangle_normal(&hgrid_core::SceneHit::MISS), None);
-        assert!(scene.object_of(&hgrid_core::SceneHit::MISS).is_none());
+        assert_eq!(scene.triangle_normal(&SceneHit::MISS), None);
+        assert!(scene.object_of(&SceneHit::MISS).is_none());
     }
+}
+
+/// A hit names an object only if the path ends at one that has the triangle.
+#[test]
+fn hits_that_no_query_gives_name_nothing() {
+    with_triangle(|objects| {
+        let built = Built::scene(&[Instance::new(0)], objects, &Config::default()).unwrap();
+        let inner = built.open(objects).unwrap();
+        let shown = [objects[0], Object::Nothing, Object::Scene(&inner)];
+        let instances = [0, 1, 2].map(Instance::new);
+        let built = Built::scene(&instances, &shown, &Config::default()).unwrap();
+        let scene = built.open(&shown).unwrap();
+        let hit = |path: &[u32], primitive: u32| {
+            let mut hit = SceneHit { primitive, ..SceneHit::MISS };
+            hit.path[..path.len()].copy_from_slice(path);
+            hit
+        };
+        for named in [hit(&[0], 0), hit(&[2, 0], 0)] {
+            assert!(scene.object_of(&named).is_some() && scene.instance_of(&named).is_some());
+            assert!(scene.normal_of(&named, [0.0, 0.0, 1.0]).is_some());
+        }
+        for nothing in [
+            hit(&[], 0),
+            hit(&[0], 1),
+            hit(&[1], 0),
+            hit(&[2], 0),
+            hit(&[2, 0], 1),
+            hit(&[2, 1], 0),
+            hit(&[3], 0),
+            hit(&[0, 0], 0),
+            hit(&[2, 0, 0], 0),
+        ] {
+            assert!(scene.object_of(&nothing).is_none(), "{nothing:?}");
+            assert!(scene.instance_of(&nothing).is_none(), "{nothing:?}");
+            assert_eq!(scene.normal_of(&nothing, [0.0, 0.0, 1.0]), None, "{nothing:?}");
+        }
+    });
 }
 
 #[test]

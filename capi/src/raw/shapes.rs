@@ -206,9 +206,7 @@ pub(crate) unsafe fn validate_shapes(
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let tested = unsafe { shapes(view) }?;
-    if !scratch.addresses().is_empty()
-        && addresses_of(tested.shapes.blob()).overlaps(scratch.addresses())
-    {
+    if shapes_read(&tested.shapes, scratch.addresses()) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.

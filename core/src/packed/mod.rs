@@ -123,8 +123,12 @@ impl<'a> Grid<'a> {
     /// Bytes that [`pack`](Self::pack) writes.
     #[must_use]
     pub fn packed_bytes(&self) -> u64 {
-        let packed = self.packed_header().and_then(|header| MeshSections::of(&header));
-        packed.map_or(0, |sections| sections.end)
+        self.packed_sections().map_or(0, |sections| sections.end)
+    }
+
+    /// Returns where [`pack`](Self::pack) puts the mesh.
+    fn packed_sections(&self) -> Result<MeshSections, Error> {
+        MeshSections::of(&self.packed_header()?)
     }
 
     /// Writes grid and mesh as one blob for [`open_packed`](Self::open_packed), and returns the bytes of `to` that it

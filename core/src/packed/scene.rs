@@ -130,7 +130,11 @@ impl<'a> Scene<'a> {
         self.each_member(&mut |object| {
             members = members.checked_add(1).ok_or(Error::TooManyTriangles)?;
             match object {
-                Object::Grid(grid) => bytes = bytes.saturating_add(grid.packed_bytes()),
+                Object::Grid(grid) => {
+                    // Before anything is written: the view may be an empty one.
+                    let packed = grid.packed_sections()?;
+                    bytes = bytes.saturating_add(packed.end);
+                }
                 Object::Scene(scene) => {
                     references = references.saturating_add(scene.object_count.into());
                     bytes = bytes.saturating_add(scene.blob().len() as u64);
@@ -157,7 +161,8 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
     /// [`ALIGNMENT`](crate::ALIGNMENT), [`Error::OtherContent`] an object that is shapes, which are the
-    /// caller's. Nothing is written then. After those of [`Grid::pack`] `to` holds nothing of use.
+    /// caller's, those of [`Grid::open`] a grid whose blob is damaged. Nothing is written then. After those of
+    /// [`Grid::pack`] `to` holds nothing of use.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -25,7 +25,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
-use crate::ray::{Ray, round};
+use crate::ray::{INVALID_ID, Ray, round};
 use crate::shapes::{ShapeHit, Shapes};
 use crate::simd::SimdLevel;
 pub use instance::Instance;
@@ -201,17 +201,25 @@ impl<'a> Scene<'a> {
         self.blob
     }
 
-    /// The place of the object that a hit names.
+    /// The place of the object that a hit names; `None` if there is no such object, triangle or shape.
     fn place(&self, hit: &SceneHit) -> Option<Place<'a>> {
         let mut instances = [None; MAX_NESTING];
         let mut scene = *self;
-        for (instance, &number) in instances.iter_mut().zip(&hit.path) {
+        for (level, &number) in hit.path.iter().enumerate() {
             let placed = scene.instances.get(number as usize)?;
-            *instance = Some(placed);
-            match scene.objects.get(placed.object() as usize)? {
-                Object::Scene(inner) => scene = **inner,
-                object => return Some(Place { instances, object }),
-            }
+            *instances.get_mut(level)? = Some(placed);
+            let object = scene.objects.get(placed.object() as usize)?;
+            let count = match object {
+                Object::Scene(inner) => {
+                    scene = **inner;
+                    continue;
+                }
+                Object::Grid(grid) => grid.mesh().triangle_count(),
+                Object::Shapes(shapes, _) => shapes.count(),
+                Object::Nothing => 0,
+            };
+            let is_end = hit.path.iter().skip(level + 1).all(|&number| number == INVALID_ID);
+            return (is_end && hit.primitive < count).then_some(Place { instances, object });
         }
         None
     }
