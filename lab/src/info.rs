@@ -15,6 +15,7 @@ use crate::cli::blob::InfoArgs;
 use crate::notices::tell_hidden;
 use crate::plural::triangles;
 use crate::scene::format::Format;
+use crate::scene::model::Model;
 use crate::scene::{Scene, is_finite, read_model};
 use crate::shade::normal_of;
 
@@ -76,7 +77,7 @@ struct MeshFacts {
     /// Triangles and vertices of all instances together.
     triangles: usize,
     vertices: usize,
-    /// The lowest and the highest corner of the box around it.
+    /// The lowest and the highest corner of the box around its triangles, or around its vertices if it has none.
     bounds: Option<[[f32; 3]; 2]>,
     up: &'static str,
     triangles_not_finite: usize,
@@ -143,17 +144,15 @@ impl Facts {
         let (format, model) = read_model(path).with_context(cannot)?;
         let counts = [model.meshes.len(), model.instances.len()];
         let hidden = model.hidden_in(file);
-        let mesh =
-            model.flatten().context("it has more than 2^32 vertices").with_context(cannot)?;
-        let scene = Scene {
-            of_triangles: mesh.bounds(),
-            positions: mesh.positions,
-            indices: mesh.indices,
-            is_z_up: format.is_z_up(),
-            hidden,
-            ..Scene::default()
-        };
+        let scene = Scene { is_z_up: format.is_z_up(), hidden, ..Scene::default() };
         tell_hidden(&scene);
+        if model.is_shared() {
+            return Ok(Self::Mesh(MeshFacts::of_model(file, format.name(), &model, scene)));
+        }
+        let mesh = model.flatten().with_context(cannot)?;
+        let of_triangles = mesh.bounds();
+        let scene =
+            Scene { of_triangles, positions: mesh.positions, indices: mesh.indices, ..scene };
         Ok(Self::Mesh(MeshFacts::of(file, format.name(), counts, &scene)))
     }
 }
@@ -194,14 +193,7 @@ impl MeshFacts {
         scene: &Scene,
     ) -> Self {
         let Scene { positions, indices, .. } = scene;
-        let mut flat = 0;
-        for triangle in indices {
-            // The readers refuse indices of vertices that are not there.
-            let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
-            let [Some(a), Some(b), Some(c)] = corners else { continue };
-            let has_area = normal_of(&[a, b, c]).is_some();
-            flat += usize::from(is_finite(&[a, b, c]) && !has_area);
-        }
+        let [not_finite, flat] = flaws(positions, indices);
         Self {
             file: file.to_owned(),
             format,
@@ -209,15 +201,52 @@ impl MeshFacts {
             instances,
             triangles: indices.len(),
             vertices: positions.len(),
-            bounds: scene.bounds().map(|(min, max)| [min, max]),
+            bounds: scene.whole_bounds().map(|(min, max)| [min, max]),
             up: match Up::of(scene) {
                 Up::Y => "y",
                 Up::Z => "z",
             },
-            triangles_not_finite: scene.not_finite_count(),
+            triangles_not_finite: not_finite,
             triangles_without_area: flat,
         }
     }
+
+    /// The facts of a model whose meshes are shared, so that all its triangles may not fit into memory. Of these, flaws
+    /// are counted before they are transformed.
+    fn of_model(file: &str, format: &'static str, model: &Model, scene: Scene) -> Self {
+        let Model { meshes, instances, .. } = model;
+        let flaws: Vec<_> =
+            meshes.iter().map(|mesh| flaws(&mesh.positions, &mesh.indices)).collect();
+        let of_triangles = model.bounds();
+        let positions = of_triangles.map_or_else(Vec::new, |(min, max)| vec![min, max]);
+        let scene = Scene { positions, of_triangles, ..scene };
+        let mut facts = Self::of(file, format, [meshes.len(), instances.len()], &scene);
+        facts.vertices = 0;
+        for &(mesh, _) in instances {
+            let [not_finite, flat] = flaws[mesh];
+            facts.triangles += meshes[mesh].indices.len();
+            facts.vertices += meshes[mesh].positions.len();
+            facts.triangles_not_finite += not_finite;
+            facts.triangles_without_area += flat;
+        }
+        facts
+    }
+}
+
+/// Counts triangles that are not finite, and those of the others that have no area.
+fn flaws(positions: &[[f32; 3]], indices: &[[u32; 3]]) -> [usize; 2] {
+    let (mut not_finite, mut flat) = (0, 0);
+    for triangle in indices {
+        // The readers refuse indices of vertices that are not there.
+        let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
+        let [Some(a), Some(b), Some(c)] = corners else { continue };
+        if !is_finite(&[a, b, c]) {
+            not_finite += 1;
+        } else if normal_of(&[a, b, c]).is_none() {
+            flat += 1;
+        }
+    }
+    [not_finite, flat]
 }
 
 impl BlobFacts {

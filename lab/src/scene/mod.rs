@@ -97,8 +97,7 @@ impl Scene {
             let positions = model.bounds().map_or_else(Vec::new, |(min, max)| vec![min, max]);
             return Ok((Self { positions, ..scene }, Some(model)));
         }
-        let mesh = model.flatten();
-        let mesh = mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
+        let mesh = model.flatten().with_context(|| format!("cannot load `{spec}`"))?;
         let of_triangles = mesh.bounds();
         let Mesh { positions, indices } = mesh;
         Ok((Self { positions, indices, of_triangles, ..scene }, None))

@@ -9,9 +9,11 @@
 
 use core::fmt;
 
+use anyhow::{Context as _, Result};
 use hgrid_core::{Block, Config, Instance, Object, Scene as Instances};
 
 use super::Bounds;
+use crate::plural::counted;
 use crate::vector::{Vector, dot, round};
 
 /// The rows of a 3 x 4 matrix: a linear map, and a translation in the last column.
@@ -96,24 +98,57 @@ impl Model {
     }
 
     /// Returns the box around all finite triangles of all instances, or `None` if there are none.
+    ///
+    /// The box around a mesh tells how far an instance may reach. For each side of the box around all, instances are
+    /// looked at from the one that may reach the farthest on, as long as they may reach farther than those before.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let is_used: Vec<_> = self.meshes.iter().map(Mesh::is_used).collect();
-        let of = |&(mesh, transform): &(usize, Transform)| {
-            let vertices = self.meshes.get(mesh)?.vertices(is_used.get(mesh)?);
-            bounds(vertices.map(|position| moved(&transform, position)))
-        };
-        let corners = self.instances.iter().filter_map(of).flat_map(|(min, max)| [min, max]);
-        bounds(corners)
+        let of_meshes = self.meshes.iter().zip(&is_used);
+        let boxes: Vec<_> =
+            of_meshes.map(|(mesh, is_used)| bounds(mesh.vertices(is_used))).collect();
+        let mut waiting = Vec::with_capacity(self.instances.len());
+        let mut corners = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            for (side, corner) in corners.iter_mut().enumerate() {
+                let sign = [-1.0, 1.0][side];
+                for (place, (mesh, transform)) in self.instances.iter().enumerate() {
+                    let Some(of_mesh) = boxes.get(*mesh).copied().flatten() else { continue };
+                    let farthest = farthest(transform, of_mesh, axis, side == 1);
+                    let reach = sign * moved(transform, farthest)[axis];
+                    // A transform that is not finite may reach anywhere.
+                    waiting.push((if reach.is_nan() { f32::INFINITY } else { reach }, place));
+                }
+                waiting.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+                let mut most = f32::NEG_INFINITY;
+                while let Some((reach, place)) = waiting.pop() {
+                    let is_behind = reach <= most;
+                    if is_behind {
+                        break;
+                    }
+                    let (mesh, transform) = &self.instances[place];
+                    let vertices = self.meshes[*mesh].vertices(&is_used[*mesh]);
+                    let finite = vertices.map(|vertex| moved(transform, vertex)).filter(is_finite);
+                    most = finite.map(|vertex| sign * vertex[axis]).fold(most, f32::max);
+                }
+                waiting.clear();
+                // A zero without a sign.
+                corner[axis] = sign * most + 0.0;
+            }
+        }
+        let [min, max] = corners;
+        is_finite(&min).then_some((min, max))
     }
 
-    /// Returns the triangles of all instances as one mesh; `None` if it would have more than 2^32 vertices.
+    /// Returns the triangles of all instances as one mesh.
     ///
     /// Fronts of triangles stay fronts: a mirroring transform swaps two corners.
-    #[must_use]
-    pub fn flatten(mut self) -> Option<Mesh> {
+    ///
+    /// # Errors
+    /// If it would have more than 2^32 vertices, or there is not enough memory for it.
+    pub fn flatten(mut self) -> Result<Mesh> {
         if let ([_], [(0, IDENTITY)]) = (&*self.meshes, &*self.instances) {
-            return self.meshes.pop();
+            return Ok(self.meshes.pop().unwrap_or_default());
         }
         let instances = || {
             let mesh = |&(mesh, transform)| Some((self.meshes.get(mesh)?, transform));
@@ -124,12 +159,15 @@ impl Model {
             vertices += mesh.positions.len();
             triangles += mesh.indices.len();
         }
-        u32::try_from(vertices).ok()?;
+        u32::try_from(vertices).context("it has more than 2^32 vertices")?;
         let mut all = Mesh::default();
-        all.positions.reserve_exact(vertices);
-        all.indices.reserve_exact(triangles);
+        let positions = all.positions.try_reserve_exact(vertices);
+        positions.and_then(|()| all.indices.try_reserve_exact(triangles)).with_context(|| {
+            let triangles = counted(triangles, "triangle", "triangles");
+            format!("there is not enough memory for the {triangles} of all its instances")
+        })?;
         for (mesh, transform) in instances() {
-            let first = u32::try_from(all.positions.len()).ok()?;
+            let first = u32::try_from(all.positions.len())?;
             all.positions.extend(mesh.positions.iter().map(|&p| moved(&transform, p)));
             let is_mirrored = determinant(&transform) < 0.0;
             // An index out of range stays out of range, for the core to refuse.
@@ -140,8 +178,18 @@ impl Model {
                 if is_mirrored { [a, c, b] } else { [a, b, c] }
             }));
         }
-        Some(all)
+        Ok(all)
     }
+}
+
+/// Returns the corner of a box that lies farthest along an axis, up or down, once it is transformed. No point of the
+/// box lies farther, not even after rounding: the sums for both are rounded alike, and rounding keeps their order.
+fn farthest(transform: &Transform, (min, max): Bounds, axis: usize, is_up: bool) -> [f32; 3] {
+    [0, 1, 2].map(|k| if (transform[axis][k] >= 0.0) == is_up { max[k] } else { min[k] })
+}
+
+fn is_finite(position: &[f32; 3]) -> bool {
+    position.iter().all(|c| c.is_finite())
 }
 
 /// Returns true if these transforms have inverses that a scene takes.
@@ -175,7 +223,6 @@ pub(crate) fn determinant(transform: &Transform) -> f64 {
 
 /// Returns the box around all finite points, or `None` if there are none.
 pub(super) fn bounds(positions: impl Iterator<Item = [f32; 3]>) -> Option<Bounds> {
-    let is_finite = |position: &[f32; 3]| position.iter().all(|c| c.is_finite());
     positions.filter(is_finite).fold(None, |bounds, position| {
         let (mut min, mut max) = bounds.unwrap_or((position, position));
         for axis in 0..3 {
@@ -196,7 +243,7 @@ mod tests {
             positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             indices: vec![[0, 1, 2]],
         };
-        assert_eq!(Model::from(mesh.clone()).flatten().as_ref(), Some(&mesh));
+        assert_eq!(Model::from(mesh.clone()).flatten().unwrap(), mesh);
         let moved = [[2.0, 0.0, 0.0, 5.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, -1.0]];
         let mirror = [[-1.0, 0.0, 0.0, 0.0], IDENTITY[1], IDENTITY[2]];
         let model = Model {
@@ -248,6 +295,43 @@ mod tests {
         let model = of(&[(0, IDENTITY), (0, beside), (7, beside)]);
         assert_eq!(model.bounds(), Some(([0.0; 3], [6.0, 1.0, 2.0])));
         assert_eq!(Model::default().bounds(), None);
+    }
+
+    /// The box of many instances is that of all their vertices, bit for bit.
+    #[test]
+    fn instances_that_cannot_reach_farther_are_passed_over() {
+        let mut state = 1_u32;
+        let mut number = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f32::from(u16::try_from(state >> 16).unwrap()) / 32_768.0 - 1.0
+        };
+        for round in 0..200 {
+            let mut mesh = || {
+                let positions: Vec<_> = (0..9).map(|_| [number(), number(), number()]).collect();
+                Mesh { positions, indices: vec![[0, 1, 2], [3, 4, 5], [6, 7, 7]] }
+            };
+            let meshes = vec![mesh(), mesh()];
+            let instances: Vec<_> = (0..30)
+                .map(|k| {
+                    let mut transform = [(); 3].map(|()| [(); 4].map(|()| number()));
+                    if round % 2 == 0 {
+                        transform[1] = [0.0, 1.0, 0.0, 0.5];
+                    }
+                    if round % 50 == 0 && k == 7 {
+                        transform[0] = [3e38; 4];
+                    }
+                    (k % 2, transform)
+                })
+                .collect();
+            let model = Model { meshes, instances, ..Model::default() };
+            let all = model.instances.iter().flat_map(|(mesh, transform)| {
+                let used = &model.meshes[*mesh].positions[..8];
+                used.iter().map(|&vertex| moved(transform, vertex)).collect::<Vec<_>>()
+            });
+            let expected = bounds(all).map(|(min, max)| [min, max].map(|p| p.map(f32::to_bits)));
+            let found = model.bounds().map(|(min, max)| [min, max].map(|p| p.map(f32::to_bits)));
+            assert_eq!(found, expected);
+        }
     }
 
     #[test]
