@@ -18,6 +18,7 @@ use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{
     Config, Grid, Hit, INVALID_ID, Method, Object, Ray, Scene as Instances, TriangleMesh, refit,
 };
+use indicatif::HumanBytes;
 use serde::Serialize;
 
 use crate::camera::Up;
@@ -139,6 +140,8 @@ pub struct Report {
     pub grown: u32,
     /// Bytes of the largest grid.
     pub index_bytes: usize,
+    /// Bytes of the scene of instances, index and scratch; 0 without instances.
+    pub scene_bytes: usize,
     /// The middle values of all frames.
     pub median: Frame,
     /// One for each frame. The first is the slowest, because the system provides the pages when they are
@@ -170,12 +173,16 @@ impl fmt::Display for Report {
             row(&number.to_string(), frame)?;
         }
         row("median", &self.median)?;
-        let mebibytes = crate::measure::ratio(self.index_bytes as u64, 1 << 20);
-        write!(f, "\nThe grid took up to {mebibytes:.1} MiB")?;
+        write!(f, "\nThe grid took up to {}", HumanBytes(self.index_bytes as u64))?;
         match self.grown {
-            0 => f.write_str(" of memory that was there from the first frame on."),
-            grown => write!(f, "; its memory grew {}.", counted(grown, "time", "times")),
+            0 => f.write_str(" of memory that was there from the first frame on.")?,
+            grown => write!(f, "; its memory grew {}.", counted(grown, "time", "times"))?,
         }
+        if self.scene_bytes > 0 {
+            let scene_bytes = HumanBytes(self.scene_bytes as u64);
+            write!(f, " The scene of its instances has {scene_bytes}.")?;
+        }
+        Ok(())
     }
 }
 
@@ -255,6 +262,7 @@ fn animate(
         size: plan.tiles.size,
         grown,
         index_bytes,
+        scene_bytes: if instances > 0 { memory.bytes() } else { 0 },
         median: Frame {
             build_ms: middle(|frame| frame.build_ms),
             scene_ms: middle(|frame| frame.scene_ms),

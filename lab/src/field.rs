@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use anyhow::{Context as _, Result};
 use hgrid_core::{Block, Config, Control, Hit, Instance, Object, Ray, RayF64, Scene, TriangleMesh};
 
-use crate::camera::{Camera, Up};
+use crate::camera::{Camera, Up, is_flat};
 use crate::scene::{Bounds, Scene as Model};
 use crate::shade::{Rgb, Shader};
 use crate::tiles::TILE_RAYS;
@@ -26,6 +26,8 @@ pub struct Field {
     up: Up,
     middle: Vector,
     extent: f64,
+    /// The height of the mesh, or its extent if it is not flat.
+    height: f64,
 }
 
 impl Field {
@@ -37,7 +39,10 @@ impl Field {
         };
         let (middle, size) = (along(|a, b| 0.5 * (a + b)), along(|a, b| b - a));
         let extent = size.into_iter().fold(0.0, f64::max);
-        Self { count, up, middle, extent: if extent > 0.0 { extent } else { 1.0 } }
+        let extent = if extent > 0.0 { extent } else { 1.0 };
+        let [_, height, _] = up.turned(size);
+        let height = if is_flat((min, max), up) { height } else { extent };
+        Self { count, up, middle, extent, height }
     }
 
     /// Makes a field of so many instances of a scene, on its ground plane; none for 0.
@@ -67,7 +72,7 @@ impl Field {
     pub fn bounds(&self) -> Bounds {
         let reach = 0.5 * self.side() * STEP * self.extent;
         // The largest instance, at any rotation.
-        let height = 1.3 * 0.5 * self.extent;
+        let height = 1.3 * 0.5 * self.height;
         let corner = self.up.turned_back([reach, height, reach]).map(f64::abs);
         (round(offset(self.middle, -1.0, corner)), round(offset(self.middle, 1.0, corner)))
     }
@@ -118,6 +123,11 @@ impl Memory {
         let bound = bound.context("scenes are built with bvh, and of fewer instances")?;
         let blocks = |bytes| vec![Block::ZERO; Block::count_for(bytes)];
         Ok(Self { index: blocks(bound.index_bytes), scratch: blocks(bound.scratch_bytes) })
+    }
+
+    /// Bytes of the index and the scratch.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.index) + size_of_val(&*self.scratch)
     }
 
     pub(crate) fn build<'a>(

@@ -118,7 +118,7 @@ struct GridFacts {
     quality: Option<&'static str>,
     bounds: [[f32; 3]; 2],
     triangles_not_finite: u32,
-    triangles_without_area: u32,
+    triangles_without_area: usize,
     lists: u64,
     references: u64,
     longest_list: u32,
@@ -326,11 +326,13 @@ impl GridFacts {
             Parameters::Bvh { quality } => Some(quality.name()),
             _ => None,
         };
+        let triangles = (0..grid.mesh().triangle_count()).filter_map(|id| grid.mesh().triangle(id));
+        let flat = triangles.filter(|corners| is_finite(corners) && normal_of(corners).is_none());
         Self {
             quality,
             bounds: [min, max],
             triangles_not_finite: found.skipped_count,
-            triangles_without_area: found.degenerate_count,
+            triangles_without_area: flat.count(),
             lists: found.list_count,
             references: found.reference_count,
             longest_list: found.longest_list,

@@ -17,7 +17,7 @@ use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::notices::tell;
 use crate::progress::Progress;
 use crate::render::unseen;
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::shade::Shade;
 use crate::threads::Threads;
 
@@ -69,6 +69,7 @@ impl Results {
     /// # Errors
     /// The errors of [`run`].
     pub fn measure(scenes: &[OsString], race: &Race) -> Result<Self> {
+        scene::check(scenes)?;
         let configs = race.configs();
         let size = race.picture.size;
         let total = scenes.len() as u64 * rows(size, configs.len(), race.repeat);

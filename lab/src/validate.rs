@@ -53,8 +53,15 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     };
     let grid = opened.with_context(|| format!("`{file}` cannot be opened"))?;
     let start = Instant::now();
-    grid.validate(&mut vec![0; grid.validate_bytes()])
-        .with_context(|| format!("`{file}` is not valid"))?;
+    grid.validate(&mut vec![0; grid.validate_bytes()]).with_context(|| match &args.mesh {
+        Some(mesh) => {
+            format!(
+                "`{file}` is not valid, or was built for another mesh than `{}`",
+                mesh.display()
+            )
+        }
+        None => format!("`{file}` is not valid"),
+    })?;
     let (method, triangles) = (grid.method().name(), triangles(info.triangle_count));
     let time = seconds(start.elapsed().as_secs_f64());
     let rest = rest(&blob, &info);

@@ -318,6 +318,30 @@ fn packed_files_are_described_proved_and_rendered() {
     assert!(folder.fails("info nothing.hgrid").unwrap().contains("cannot open it"));
 }
 
+/// A mesh without height, on a field of instances: seen from above, not along its plane.
+#[test]
+fn flat_meshes_are_seen_on_a_field() {
+    let folder = Folder::new("flat").unwrap();
+    fs::write(folder.0.join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\nf 1 2 2\n").unwrap();
+    for count in [1, 4] {
+        let words = format!("animate flat.obj --size 32 --frames 1 --instances {count}");
+        let said = folder.says(&words).unwrap();
+        assert!(said.contains("The scene of its instances has"), "{said}");
+    }
+    // The same triangles count as flat in the mesh and in its blob.
+    folder.says("pack flat.obj -o flat.hgrid").unwrap();
+    for file in ["flat.obj", "flat.hgrid"] {
+        let said = folder.says(&format!("info {file}")).unwrap();
+        assert!(said.contains("without area  1 triangle"), "{said}");
+    }
+    // All scenes are looked for before the first is measured.
+    for command in ["table", "figures -o charts"] {
+        let said = folder.fails(&format!("{command} procedural:knot:2K typo.ply")).unwrap();
+        assert!(said.contains("error: cannot load `typo.ply`: cannot open it"), "{said}");
+        assert!(!folder.0.join("charts").exists());
+    }
+}
+
 #[test]
 fn one_triangle_is_no_plural() {
     let folder = Folder::new("one").unwrap();

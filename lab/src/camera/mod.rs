@@ -25,6 +25,7 @@ pub use view::{Point, Up, View};
 use crate::scene::Bounds;
 use crate::vector::{Vector, cross, dot, offset, round, unit};
 use view::half_extent;
+pub(crate) use view::is_flat;
 
 /// The extent of the picture, as a multiple of the box's.
 const MARGIN: f64 = 1.04;

@@ -117,7 +117,7 @@ impl View {
 }
 
 /// Returns true if a box is much wider than high.
-pub(super) fn is_flat(bounds: Bounds, up: Up) -> bool {
+pub(crate) fn is_flat(bounds: Bounds, up: Up) -> bool {
     let [x, y, z] = up.turned(half_extent(bounds)).map(f64::abs);
     y < FLAT * x.max(z)
 }

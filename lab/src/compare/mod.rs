@@ -48,6 +48,7 @@ use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
 use crate::image::{check_sources, check_writable, in_folder};
+use crate::scene;
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
@@ -67,6 +68,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let mut systems = methods_of(&args.methods, args.quality.unwrap_or_default());
     systems.extend(peers::systems(&args.peers)?);
+    scene::check(&args.scenes)?;
     match &args.output {
         Some(folder) => in_folder(folder, || measure(args, systems)),
         None => measure(args, systems),

@@ -19,6 +19,7 @@ use crate::cli::FiguresArgs;
 use crate::image;
 use crate::notices::say;
 use crate::plot::{COLORS, Drawing, save, svg};
+use crate::scene;
 use crate::table::Results;
 
 /// Measures, draws and writes.
@@ -26,6 +27,7 @@ use crate::table::Results;
 /// # Errors
 /// If a scene cannot be loaded or built, or a file cannot be written.
 pub fn run(args: &FiguresArgs) -> Result<()> {
+    scene::check(&args.scenes)?;
     image::in_folder(&args.output, || measure(args))
 }
 

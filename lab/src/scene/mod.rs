@@ -72,22 +72,18 @@ impl Scene {
     /// # Errors
     /// The errors of [`load`](Self::load).
     pub fn open(spec: &OsStr, takes_instances: bool) -> Result<(Self, Option<Model>)> {
-        let path = Path::new(spec);
-        // A name that is no text is that of one file.
-        let (text, spec) = (spec.to_str().unwrap_or_default(), spec.display());
-        if let Some((inner, outer)) = text.split_once('+').filter(|_| !path.exists()) {
-            return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
-        }
-        if let Some(words) = text.strip_prefix("procedural:") {
-            let scene = procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
-            return Ok((scene, None));
-        }
-        if !path.exists() && Format::named(path).is_none() {
-            bail!(
-                "no scene `{spec}`: name a file that ends in {ENDINGS}, or procedural:NAME:TRIANGLES, \
-                 where NAME is {}; or one inside another, A+B",
-                procedural::NAMES.join(", ")
-            );
+        let (path, source) = (Path::new(spec), Source::of(spec)?);
+        let spec = spec.display();
+        match source {
+            Source::Pair(inner, outer) => {
+                return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
+            }
+            Source::Formula(words) => {
+                let scene =
+                    procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
+                return Ok((scene, None));
+            }
+            Source::File => {}
         }
         let (format, model) = read_model(path).with_context(|| format!("cannot load `{spec}`"))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -196,6 +192,73 @@ impl Scene {
     }
 }
 
+/// What the words of a scene mean.
+enum Source<'s> {
+    /// One scene inside another.
+    Pair(&'s str, &'s str),
+    /// A scene by a formula.
+    Formula(&'s str),
+    /// A file.
+    File,
+}
+
+impl<'s> Source<'s> {
+    fn of(spec: &'s OsStr) -> Result<Self> {
+        let path = Path::new(spec);
+        // A name that is no text is that of one file.
+        let text = spec.to_str().unwrap_or_default();
+        if !path.exists()
+            && let Some((inner, outer)) = pair(text)
+        {
+            return Ok(Self::Pair(inner, outer));
+        }
+        if let Some(words) = text.strip_prefix("procedural:") {
+            return Ok(Self::Formula(words));
+        }
+        if !path.exists() && Format::named(path).is_none() {
+            bail!(
+                "no scene `{}`: name a file that ends in {ENDINGS}, or procedural:NAME:TRIANGLES, \
+                 where NAME is {}; or one inside another, A+B",
+                spec.display(),
+                procedural::NAMES.join(", ")
+            );
+        }
+        Ok(Self::File)
+    }
+}
+
+/// Splits A+B behind the first file that is there: its name may have a plus, too.
+fn pair(text: &str) -> Option<(&str, &str)> {
+    let pluses = || text.match_indices('+').map(|(at, _)| (&text[..at], &text[at + 1..]));
+    pluses().find(|(inner, _)| Path::new(inner).exists()).or_else(|| pluses().next())
+}
+
+/// Looks at the words of scenes and at the starts of their files, before long work with the first of them.
+///
+/// # Errors
+/// If a scene is not there, or a file is of no format that is read.
+pub(crate) fn check(scenes: &[impl AsRef<OsStr>]) -> Result<()> {
+    for spec in scenes {
+        let spec = spec.as_ref();
+        match Source::of(spec)? {
+            Source::Pair(inner, outer) => check(&[inner, outer])?,
+            Source::Formula(_) => {}
+            Source::File => {
+                let format = Format::of(Path::new(spec));
+                format.with_context(|| format!("cannot load `{}`", spec.display()))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns a word of a file in quotes for a message: its first letters, and none that would move the cursor.
+pub(crate) fn quoted(word: &str) -> String {
+    let start: String = word.chars().take(40).collect();
+    let rest = if start.len() < word.len() { "..." } else { "" };
+    format!("`{}{rest}`", start.escape_debug())
+}
+
 /// Returns true if the core takes a triangle as finite.
 pub(crate) fn is_finite(triangle: &Triangle) -> bool {
     triangle.as_flattened().iter().all(|c| c.abs() <= MAX_COORDINATE)
@@ -255,6 +318,32 @@ mod tests {
         assert_eq!(small.clone().within(bad).indices[2000][2], u32::MAX);
         let message = format!("{:#}", Scene::load("procedural:knot+nothing").unwrap_err());
         assert!(message.contains("`nothing`"), "{message}");
+    }
+
+    #[test]
+    fn names_of_files_may_have_a_plus() {
+        let folder = std::env::temp_dir().join(format!("hgrid+plus-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("a+b.obj");
+        std::fs::write(&file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let file = file.to_str().unwrap();
+        let spec = format!("{file}+{file}+procedural:knot:2000");
+        check(&[&spec]).unwrap();
+        let scene = Scene::load(&spec).unwrap();
+        assert_eq!(scene.geometries, [0, 1, 2]);
+        let missing = format!("{spec}+none.obj");
+        for message in [check(&[&missing]).unwrap_err(), Scene::load(&missing).unwrap_err()] {
+            let message = format!("{message:#}");
+            assert!(message.starts_with("cannot load `none.obj`: cannot open it"), "{message}");
+        }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn words_in_messages_are_short_and_plain() {
+        assert_eq!(quoted("zero"), "`zero`");
+        assert_eq!(quoted("\u{1b}[2J"), "`\\u{1b}[2J`");
+        assert_eq!(quoted(&"7".repeat(41)), format!("`{}...`", "7".repeat(40)));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::{Mesh, Model};
+use super::{Mesh, Model, quoted};
 use crate::plural::counted;
 
 /// Reads a file.
@@ -82,7 +82,8 @@ fn vertex(words: &str) -> Result<[f32; 3]> {
     let mut vertex = [0.0; 3];
     for (coordinate, axis) in vertex.iter_mut().zip(["x", "y", "z"]) {
         let word = words.next().with_context(|| format!("the vertex has no {axis}"))?;
-        *coordinate = word.parse().ok().with_context(|| format!("`{word}` is no number"))?;
+        *coordinate =
+            word.parse().ok().with_context(|| format!("{} is no number", quoted(word)))?;
     }
     Ok(vertex)
 }
@@ -92,7 +93,8 @@ fn face(words: &str, vertices: usize, corners: &mut Vec<u32>) -> Result<()> {
     corners.clear();
     for word in words.split_ascii_whitespace() {
         let index = word.split('/').next().unwrap_or(word);
-        let index: i64 = index.parse().ok().with_context(|| format!("`{word}` is no corner"))?;
+        let index: i64 =
+            index.parse().ok().with_context(|| format!("{} is no corner", quoted(word)))?;
         let from_zero = match index {
             1.. => index - 1,
             0 => bail!("there is no vertex 0: vertices count from 1"),

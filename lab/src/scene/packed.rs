@@ -14,10 +14,14 @@ use crate::blob::Blob;
 /// If the file is no blob of this version, or has no mesh.
 pub(super) fn load(path: &Path) -> Result<Mesh> {
     let blob = Blob::read(path)?;
-    let content = BlobInfo::peek(blob.bytes())?.content;
+    let BlobInfo { content, has_mesh, .. } = BlobInfo::peek(blob.bytes())?;
     ensure!(
         content != Content::Packed,
         "it is a packed scene, which only `hgrid info` and `hgrid validate` take"
+    );
+    ensure!(
+        has_mesh || content != Content::Triangles,
+        "its mesh is not in it: name the file that it was built for"
     );
     let grid = Grid::open_packed(blob.bytes()).context("it cannot be opened")?;
     let mesh = grid.mesh();

@@ -5,7 +5,7 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::{Mesh, Model};
+use super::{Mesh, Model, quoted};
 use crate::plural::{counted, triangles};
 
 /// Bytes before the first triangle of a binary file: a comment and the triangle count.
@@ -113,7 +113,7 @@ fn read_line(
         "solid" => *is_complete = false,
         "endsolid" => *is_complete = true,
         "facet" | "outer" | "endloop" | "color" => {}
-        _ => bail!("`{first}` is no word of an STL file"),
+        _ => bail!("{} is no word of an STL file", quoted(first)),
     }
     Ok(())
 }

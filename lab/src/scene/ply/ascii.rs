@@ -6,6 +6,8 @@
 use anyhow::{Context as _, Result};
 use ply_rs_bw::ply::{BeginList, ElementDef, PropertyAccess, PropertyType, ScalarType};
 
+use crate::scene::quoted;
+
 /// Reads the line of an element.
 ///
 /// # Errors
@@ -43,5 +45,5 @@ pub(super) fn read<E: PropertyAccess>(line: &str, element: &ElementDef) -> Resul
 }
 
 fn number<T: core::str::FromStr>(word: &str) -> Result<T> {
-    word.parse().ok().with_context(|| format!("`{word}` is no number that fits here"))
+    word.parse().ok().with_context(|| format!("{} is no number that fits here", quoted(word)))
 }
