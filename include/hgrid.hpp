@@ -35,9 +35,9 @@
  * function is noexcept. One that leaves a callable of yours ends the program, as it could not pass
  * through C.
  *
- * Lifetimes: meshes, views, options and configurations refer to what they were given: arrays,
- * counters, callables. Callables must have a name, so that they are still there when they are
- * called; the compiler refuses others.
+ * Lifetimes: meshes, boxes, views, scenes, options and configurations refer to what they were given:
+ * arrays, blobs, objects, counters, callables. All of these must have a name, so that they are still
+ * there when they are used; the compiler refuses temporaries.
  *
  * Threads: as in hgrid.h. Any number of threads may query one grid or view.
  *
@@ -518,6 +518,20 @@ template <class C, class T>
 struct holds<C, T, void_t<element_of<C>, decltype(size_of(std::declval<C &>()))>>
     : std::is_convertible<element_of<C> (*)[], T (*)[]> {};
 
+// Tells whether a type owns its elements. A destructor with work to do tells an owner from a span. Arrays have none,
+// and are owners all the same.
+template <class C>
+struct owns : std::integral_constant<bool, !std::is_trivially_destructible<C>::value> {};
+template <class T, std::size_t N>
+struct owns<T[N]> : std::true_type {};
+template <class T, std::size_t N>
+struct owns<std::array<T, N>> : std::true_type {};
+
+// Tells whether what is referred to is there later.
+template <class C>
+struct stays : std::integral_constant<bool, std::is_lvalue_reference<C>::value ||
+                                                !owns<std::remove_cv_t<std::remove_reference_t<C>>>::value> {};
+
 } // namespace detail
 
 /// Elements side by side: a pointer and a number. Made from arrays and from everything with `data()`
@@ -532,8 +546,7 @@ public:
     /// The elements of a container or an array. One that is to be written must not be a temporary.
     template <class C,
               std::enable_if_t<detail::holds<std::remove_reference_t<C>, T>::value &&
-                                   (std::is_lvalue_reference<C>::value || std::is_const<T>::value ||
-                                    std::is_trivially_destructible<C>::value),
+                                   (std::is_const<T>::value || detail::stays<C &&>::value),
                                int> = 0>
     constexpr span(C &&container) noexcept
         : data_(detail::data_of(container)), size_(detail::size_of(container))
@@ -571,6 +584,10 @@ span<const byte> as_bytes(const C &container) noexcept
     return {reinterpret_cast<const byte *>(detail::data_of(container)),
             detail::size_of(container) * sizeof(*detail::data_of(container))};
 }
+
+/// The bytes are those of the elements, which must be there as long: give them a name.
+template <class C, std::enable_if_t<!detail::stays<C &&>::value, int> = 0>
+span<const byte> as_bytes(C &&) = delete;
 
 /// The bytes of elements, to be written: an array becomes a region.
 template <class C>
@@ -633,8 +650,7 @@ constexpr auto field(C &&structs, M S::*member) noexcept
 {
     using struct_type = detail::element_of<C>;
     using field_type = std::conditional_t<std::is_const<struct_type>::value, const M, M>;
-    static_assert(std::is_lvalue_reference<C>::value || std::is_trivially_destructible<C>::value,
-                  "the structs must outlive this: give them a name");
+    static_assert(detail::stays<C &&>::value, "the structs must outlive this: give them a name");
     const bool empty = detail::size_of(structs) == 0;
     return strided<field_type>(empty ? nullptr : std::addressof(detail::data_of(structs)->*member),
                                sizeof(struct_type), detail::size_of(structs));
@@ -726,13 +742,6 @@ constexpr strided<const element_of<const C>> elements(const C &container) noexce
 {
     return container;
 }
-
-// Tells whether what is referred to is there later.
-template <class C>
-struct stays
-    : std::integral_constant<bool, std::is_lvalue_reference<C>::value ||
-                                       std::is_trivially_destructible<
-                                           std::remove_reference_t<C>>::value> {};
 
 } // namespace detail
 
@@ -931,6 +940,9 @@ public:
         };
         return *this;
     }
+    /// The configuration refers to the callable: give it a name.
+    template <class F>
+    config &progress(const F &&) = delete;
 
     /// Builds in up to so many tasks at once, each of which takes scratch.
     ///
@@ -948,6 +960,9 @@ public:
         };
         return *this;
     }
+    /// The configuration refers to the callable: give it a name.
+    template <class F>
+    config &parallel_for(std::uint32_t, const F &&) = delete;
 
     /// The same for a call in C, which must end before this configuration does.
     ::hgrid_config c() const noexcept
@@ -1037,6 +1052,9 @@ public:
         };
         return *this;
     }
+    /// The options refer to the filter: give it a name.
+    template <class F>
+    options &filter(const F &&) = delete;
 
     /// The same for a call in C.
     const ::hgrid_query_options &c() const noexcept { return raw_; }
@@ -1130,9 +1148,9 @@ public:
     /// A view of nothing.
     view() noexcept = default;
     /// A view of a grid that is about to go: give the grid a name.
-    view(grid &&) = delete;
+    view(const grid &&) = delete;
     /// The same.
-    view &operator=(grid &&) = delete;
+    view &operator=(const grid &&) = delete;
     /// A view that was built or opened in C.
     explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
 
@@ -1673,6 +1691,9 @@ public:
         };
         return *this;
     }
+    /// The options refer to the filter: give it a name.
+    template <class F>
+    scene_options &filter(const F &&) = delete;
     /// The struct that C takes.
     const ::hgrid_scene_options &c() const noexcept { return raw_; }
 
@@ -1710,6 +1731,10 @@ public:
             return (*static_cast<Test *>(context))(shape, *along, *found);
         };
     }
+    /// Shapes refer to their boxes and to the test: give both a name.
+    template <class Boxes = strided<const std::array<float, 6>>, class Test,
+              std::enable_if_t<!detail::stays<Boxes &&>::value || !std::is_lvalue_reference<Test>::value, int> = 0>
+    boxes(Boxes &&, Test &&) = delete;
     /// A mask for each shape.
     boxes &masks(strided<const std::uint32_t> all) noexcept
     {
@@ -1718,6 +1743,9 @@ public:
         has_masks_ = all.size() == raw_.count;
         return *this;
     }
+    /// Shapes refer to their masks: give them a name.
+    template <class Masks, std::enable_if_t<!detail::stays<Masks &&>::value, int> = 0>
+    boxes &masks(Masks &&) = delete;
     /// The struct that C takes.
     const ::hgrid_boxes &c() const noexcept { return raw_; }
     /// Returns true if there are as many masks as boxes.
@@ -1756,6 +1784,9 @@ public:
             detail::said(::hgrid_open_shapes(blob.data(), blob.size(), &of.c(), &opened.raw_));
         return answer == status::ok ? result<shapes>(opened) : answer;
     }
+    /// A temporary would be freed at once: give the memory a name.
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
+    static result<shapes> open(Blob &&, const boxes &) = delete;
     /// Gives the tree in a blob the boxes of shapes that moved, in place.
     static result<shapes> refit(span<byte> blob, const boxes &of, refit_report *details = nullptr) noexcept
     {
@@ -1863,6 +1894,10 @@ public:
                                              index.size(), scratch.data(), scratch.size(), &built.raw_, details));
         return answer == status::ok ? result<scene>(built) : answer;
     }
+    /// The scene refers to its objects: give them a name. The instances are copied.
+    template <class Objects, std::enable_if_t<!detail::stays<Objects &&>::value, int> = 0>
+    static result<scene> build(span<const instance>, Objects &&, const config &, span<byte>, span<byte>,
+                               report * = nullptr) = delete;
     /// Opens a blob that was built with these objects.
     static result<scene> open(span<const byte> blob, span<const object> of) noexcept
     {
@@ -1871,6 +1906,10 @@ public:
             ::hgrid_open_scene(blob.data(), blob.size(), of.data(), of.size(), &opened.raw_));
         return answer == status::ok ? result<scene>(opened) : answer;
     }
+    /// The scene refers to its blob and to its objects: give both a name.
+    template <class Blob, class Objects = span<const object>,
+              std::enable_if_t<!detail::stays<Blob &&>::value || !detail::stays<Objects &&>::value, int> = 0>
+    static result<scene> open(Blob &&, Objects &&) = delete;
     /// Gives the scene in a blob other instances, as many as before, in place.
     static result<scene> refit(span<const instance> all, span<const object> of, span<byte> blob,
                                refit_report *details = nullptr) noexcept
@@ -1880,6 +1919,9 @@ public:
                                                                blob.data(), blob.size(), &moved.raw_, details));
         return answer == status::ok ? result<scene>(moved) : answer;
     }
+    /// The scene refers to its objects: give them a name. The instances are copied.
+    template <class Objects, std::enable_if_t<!detail::stays<Objects &&>::value, int> = 0>
+    static result<scene> refit(span<const instance>, Objects &&, span<byte>, refit_report * = nullptr) = delete;
     /// Tells how much memory is enough for any scene of so many instances, with any configuration.
     static status bound(std::size_t instances, const config &how, report &details) noexcept
     {
@@ -1934,6 +1976,9 @@ public:
                                                    scratch.data(), scratch.size(), &bytes, &opened.raw_));
         return answer == status::ok ? result<scene>(opened) : answer;
     }
+    /// A temporary would be freed at once: give the memory a name.
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
+    static result<scene> open_packed(Blob &&, span<byte>, span<byte> = span<byte>()) = delete;
     /// The closest thing that a ray hits.
     optional<scene_hit> intersect(const ray_f64 &along) const noexcept { return intersect_in_c(along, nullptr); }
     /// The same with options.
