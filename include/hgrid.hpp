@@ -1529,9 +1529,13 @@ public:
 
     /// Gives a tree the boxes of a mesh whose vertices moved, in place; other views of it are of no use any
     /// more. After an error the grid is as it was. Errors are those of `hgrid_refit`.
-    result<refit_report> refit(const mesh &of) noexcept
+    ///
+    /// `details` begins as `HGRID_REFIT_REPORT_INIT`. It becomes the report that is returned, and after an error it
+    /// says which triangle is to blame.
+    result<refit_report> refit(const mesh &of, refit_report *details = nullptr) noexcept
     {
-        refit_report found = HGRID_REFIT_REPORT_INIT;
+        refit_report own = HGRID_REFIT_REPORT_INIT;
+        refit_report &found = details != nullptr ? *details : own;
         const auto moved = view::refit(of, blob_, &found);
         if (!moved)
             return moved.error();

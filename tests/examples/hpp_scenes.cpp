@@ -155,6 +155,19 @@ void check_scenes()
     const std::vector<std::uint32_t> two = {0, 1, 2, 0, 1, 2};
     CHECK(owner->refit(hgrid::mesh(lower, two)).error() == hgrid::status::mesh_mismatch);
     CHECK(owner->intersect(inwards)->t == 3);
+
+    // The report of an owner's refit says which triangle is to blame, as those of the views do.
+    const std::vector<std::array<float, 3>> high = {{{0, 0, 0}}, {{1, 0, 0}}, {{0, 1, 0}}, {{0, 0, 9}}};
+    std::vector<std::array<std::uint32_t, 3>> pair = {{{0, 1, 2}}, {{1, 2, 3}}};
+    auto of_pair = hgrid::grid::build(hgrid::mesh(high, pair));
+    hgrid::refit_report blame = HGRID_REFIT_REPORT_INIT;
+    const auto cost = of_pair->refit(hgrid::mesh(high, pair), &blame);
+    CHECK(cost && cost->cost_after > 0 && blame.triangle == hgrid::invalid_id);
+    CHECK(blame.cost_after >= cost->cost_after && blame.cost_after <= cost->cost_after);
+    auto damaged = pair;
+    damaged[1][0] = 4;
+    CHECK(of_pair->refit(hgrid::mesh(high, damaged), &blame).error() == hgrid::status::index_out_of_range);
+    CHECK(blame.triangle == 1 && of_pair->intersect(inwards)->t == 1);
     const auto one = hgrid::make_object(*up), other = hgrid::make_object(*shapes);
     CHECK(one && other);
     const std::array<hgrid::object, 2> objects = {{*one, *other}};
