@@ -2033,11 +2033,21 @@ public:
         return ::hgrid_scene_surface_at(&raw_, &along, &at, &found) ? optional<scene_surface>(found)
                                                                     : optional<scene_surface>();
     }
-    /// The normal of the triangle that was hit, of length 1, in the scene; zeros if the hit names none.
+    /// The normal of the triangle that was hit, of length 1, in the scene; zeros if the hit names none. This is right
+    /// for flat triangles. A shape of yours has a normal that only you know: use the form below.
     point normal(const scene_hit &of) const noexcept
     {
         point found = {};
         static_cast<void>(::hgrid_scene_normal(&raw_, &of, nullptr, found.data()));
+        return found;
+    }
+    /// A normal of the object that was hit, of any length, as it is in the scene, of length 1; zeros if the hit names
+    /// nothing, or the normal is null. This is right for shapes of yours, and for triangles with normals of their own
+    /// at the vertices, however the instance turns, mirrors, shears or scales.
+    point normal(const scene_hit &of, const point &object_normal) const noexcept
+    {
+        point found = {};
+        static_cast<void>(::hgrid_scene_normal(&raw_, &of, object_normal.data(), found.data()));
         return found;
     }
     /// The innermost instance that a hit names; one of no object if it names none.

@@ -88,10 +88,64 @@ void check_batches(const hgrid::scene &scene)
     CHECK(hgrid::scene().occluded_n(rays, dark, hgrid::coherence::coherent) == status::not_a_grid);
 }
 
+// The normal of a sphere in an instance that shears and scales is the object's normal times the inverse transpose.
+void check_normals()
+{
+    const std::array<std::array<float, 6>, 1> box = {{{{-1, -1, -1, 1, 1, 1}}}};
+    auto test = [](std::uint32_t, const hgrid::ray &along, hgrid::shape_hit &found) {
+        const float *o = along.origin, *d = along.direction;
+        const float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        const float b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2];
+        const float c = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1;
+        const float root = b * b - a * c;
+        found = hgrid::shape_hit{(-b - std::sqrt(root > 0 ? root : 0)) / a, 0, 0};
+        return root >= 0;
+    };
+    auto shape_memory = hgrid::memory::allocate(hgrid::index_bound(1));
+    auto scene_memory = hgrid::memory::allocate(hgrid::scene_bound(1));
+    CHECK(shape_memory && scene_memory);
+    const auto shapes = hgrid::shapes::build(hgrid::boxes(box, test), {}, *shape_memory,
+                                             hgrid::as_writable_bytes(scratch));
+    CHECK(shapes);
+    const auto sphere = hgrid::make_object(*shapes);
+    CHECK(sphere);
+    const std::array<hgrid::object, 1> objects = {{*sphere}};
+    // x grows by half of y, and z is doubled: the inverse takes half of y from x, and halves z.
+    std::array<hgrid::instance, 1> sheared;
+    sheared[0].linear[0][1] = 0.5f, sheared[0].linear[2][2] = 2, sheared[0].translation[0] = 100;
+    const auto scene = hgrid::scene::build(sheared, objects, {}, *scene_memory, hgrid::as_writable_bytes(scratch));
+    CHECK(scene);
+    int count = 0;
+    for (double x = -0.9; x < 1; x += 0.3)
+        for (double y = -0.9; y < 1; y += 0.3) {
+            const auto hit = scene->intersect(hgrid::make_ray_f64({100 + x, y, 5}, {0, 0, -1}));
+            if (!hit)
+                continue;
+            // The place in the sphere is its normal there.
+            const hgrid::point in_object = {
+                {static_cast<float>(x - y / 2), static_cast<float>(y), (5 - hit->t) / 2}};
+            const hgrid::point expected = {{in_object[0], in_object[1] - in_object[0] / 2, in_object[2] / 2}};
+            const float length = std::sqrt(expected[0] * expected[0] + expected[1] * expected[1] +
+                                           expected[2] * expected[2]);
+            const hgrid::point twice = {{2 * in_object[0], 2 * in_object[1], 2 * in_object[2]}};
+            const hgrid::point found = scene->normal(*hit, in_object), same = scene->normal(*hit, twice);
+            for (std::size_t i = 0; i < 3; i++) {
+                CHECK(is_near(found[i], expected[i] / length) && is_near(same[i], found[i]));
+                // Without the object's normal there is none, as the hit names no triangle.
+                CHECK(is_near(scene->normal(*hit)[i], 0) && is_near(scene->normal(*hit, {})[i], 0));
+            }
+            count++;
+        }
+    CHECK(count > 20);
+    const hgrid::scene_hit nothing = {1, 0, 0, hgrid::invalid_id, {0, 0, 0, 0}};
+    CHECK(is_near(hgrid::scene().normal(nothing, {{0, 0, 1}})[2], 0));
+}
+
 } // namespace
 
 void check_scenes()
 {
+    check_normals();
     // Cubes in a row; the test finds hits on their fronts.
     std::vector<ball> all;
     for (int i = 0; i < 64; i++) {
@@ -185,6 +239,7 @@ void check_scenes()
     CHECK(found && found->path[0] == 1 && found->t == 6);
     const hgrid::point normal = scene->normal(*found);
     CHECK(normal[2] == 1 || normal[2] == -1);
+    CHECK(scene->normal(*found, {{0, 0, 7}})[2] == 1 && scene->normal(*found, {{3, 0, 0}})[0] == -1);
     const auto at = scene->surface_at(left, *found);
     CHECK(at && at->normal[2] == 1 && at->position[2] == -5 && at->above[2] > -5 && at->below[2] < -5);
     CHECK(!scene->surface_at(left, {1, 0, 0, hgrid::invalid_id, {0, 0, 0, 0}}));
