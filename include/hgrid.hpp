@@ -758,6 +758,12 @@ public:
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
     /// or a field of a struct, from which on there are three: `field(faces, &face::corners)`.
     /// One or two numbers that are left over at the end make no vertex or triangle, and are ignored.
+    ///
+    /// Arrays of four do not compile, as they may be quads: make two triangles of each. If the fourth number is
+    /// padding, say where the first one is, and the bytes from triangle to triangle:
+    ///
+    ///     const hgrid::strided<const std::uint32_t> corners(padded[0].data(), sizeof padded[0], padded.size());
+    ///     const hgrid::mesh mesh(vertices, corners);
     template <class Vertices, class Indices>
     mesh(Vertices &&vertices, Indices &&indices) noexcept
     {
@@ -845,6 +851,10 @@ private:
                       "indices are integers of 32 bits, or unsigned ones of 16");
         static_assert(std::is_same<I, number>::value || sizeof(I) >= 3 * sizeof(number),
                       "a triangle has three indices");
+        // Four may be a quad, of which half would be missing.
+        static_assert(std::is_same<I, number>::value || sizeof(I) <= 3 * sizeof(number),
+                      "a triangle has three indices, not more: make two triangles of a quad; if the fourth is padding, "
+                      "pass hgrid::strided<const std::uint32_t>(first_index, stride_in_bytes, triangle_count)");
         raw_.index_type = sizeof(number) == 4 ? HGRID_INDEX_U32 : HGRID_INDEX_U16;
         raw_.indices = indices.first();
         raw_.index_stride = is_flat ? 3 * sizeof(number) : indices.stride();

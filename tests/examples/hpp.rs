@@ -152,7 +152,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 58] = [
+const REFUSED: [(&str, &str); 63] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -185,6 +185,26 @@ const REFUSED: [(&str, &str); 58] = [
         "delete",
     ),
     ("hgrid::memory m; auto g = hgrid::grid::open(m);", "delete"),
+    (
+        "std::vector<std::array<unsigned, 4>> q(1); hgrid::mesh m(vertices, q);",
+        "two triangles of a quad",
+    ),
+    (
+        "std::vector<std::array<unsigned short, 4>> q(1); hgrid::mesh m(vertices, q);",
+        "two triangles of a quad",
+    ),
+    (
+        "using row = unsigned[4]; row q[2] = {}; hgrid::mesh m(vertices, q);",
+        "two triangles of a quad",
+    ),
+    (
+        "std::vector<quad> q(1); hgrid::mesh m(vertices, hgrid::field(q, &quad::corners));",
+        "two triangles of a quad",
+    ),
+    (
+        "std::vector<std::vector<unsigned>> q(1); hgrid::mesh m(vertices, q);",
+        "three indices, not more",
+    ),
     // Temporaries of what views refer to.
     ("hgrid::mesh m(std::array<float, 9>(), indices);", "give them a name"),
     (
@@ -275,6 +295,7 @@ const PRELUDE: &str = "\
 #include <array>
 #include <vector>
 struct face { int material; unsigned corners[3]; };
+struct quad { int material; unsigned corners[4]; };
 template <class T> struct of { T x, y, z; };
 struct wide { wide() : x(0), y(0), z(0) {} double x, y, z; };
 struct late { int id; float x, y, z; };

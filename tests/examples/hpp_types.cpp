@@ -152,6 +152,15 @@ static void check_meshes()
     check_mesh(s, {hgrid::field(s.vertices, &vertex::position), triples});
     check_mesh(s, {hgrid::span<const float>(flat), hgrid::field(structs, &corners16::first)});
     check_mesh(s, hgrid::mesh(s.mesh().c()));
+    /* Four numbers for each vertex and for each triangle, of which the last one is padding. */
+    std::vector<std::array<float, 4>> wide;
+    for (const vertex &v : s.vertices)
+        wide.push_back({{v.position[0], v.position[1], v.position[2], NAN}});
+    std::vector<std::array<std::uint32_t, 4>> padded;
+    for (const face &f : s.faces)
+        padded.push_back({{f.corners[0], f.corners[1], f.corners[2], 12345678}});
+    const hgrid::strided<const std::uint32_t> corners(padded[0].data(), sizeof padded[0], padded.size());
+    check_mesh(s, {wide, corners});
     std::vector<named> by_name;
     std::vector<nested> in_structs;
     std::vector<constructed> of_classes;
