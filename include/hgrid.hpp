@@ -828,6 +828,9 @@ private:
                       "the coordinates of a vertex are floats");
         static_assert(is_double || std::is_same<V, float>::value || sizeof(V) >= 3 * sizeof(float),
                       "a vertex has three coordinates");
+        // A std::vector<float> is larger than three floats, too, but does not begin with them.
+        static_assert(std::is_void<number>::value || std::is_trivially_destructible<V>::value,
+                      "a vertex holds its floats: std::vector keeps them elsewhere, std::array does not");
         static_assert(is_double || has_floats,
                       "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
@@ -851,6 +854,8 @@ private:
                       "indices are integers of 32 bits, or unsigned ones of 16");
         static_assert(std::is_same<I, number>::value || sizeof(I) >= 3 * sizeof(number),
                       "a triangle has three indices");
+        static_assert(std::is_void<found>::value || std::is_trivially_destructible<I>::value,
+                      "a triangle holds its indices: std::vector keeps them elsewhere, std::array does not");
         // Four may be a quad, of which half would be missing.
         static_assert(std::is_same<I, number>::value || sizeof(I) <= 3 * sizeof(number),
                       "a triangle has three indices, not more: make two triangles of a quad; if the fourth is padding, "

@@ -152,7 +152,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 63] = [
+const REFUSED: [(&str, &str); 64] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -203,7 +203,11 @@ const REFUSED: [(&str, &str); 63] = [
     ),
     (
         "std::vector<std::vector<unsigned>> q(1); hgrid::mesh m(vertices, q);",
-        "three indices, not more",
+        "a triangle holds its indices",
+    ),
+    (
+        "std::vector<std::vector<float>> v(3); hgrid::mesh m(v, indices);",
+        "a vertex holds its floats",
     ),
     // Temporaries of what views refer to.
     ("hgrid::mesh m(std::array<float, 9>(), indices);", "give them a name"),
