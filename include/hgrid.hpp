@@ -1194,7 +1194,8 @@ public:
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&) = delete;
     /// Gives the tree in a blob the boxes of a mesh whose vertices moved, in place; other views of the blob are of no
-    /// use any more. After an error the blob is as it was. Errors are those of `hgrid_refit`.
+    /// use any more. If an object keeps the address of one, assign the new view to that variable. After an error the
+    /// blob is as it was. Errors are those of `hgrid_refit`.
     static result<view> refit(const mesh &of, span<byte> blob, refit_report *details = nullptr) noexcept
     {
         view moved;
@@ -1806,7 +1807,7 @@ public:
     /// A temporary would be freed at once: give the memory a name.
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<shapes> open(Blob &&, const boxes &) = delete;
-    /// Gives the tree in a blob the boxes of shapes that moved, in place.
+    /// Gives the tree in a blob the boxes of shapes that moved, in place, as `view::refit` does.
     static result<shapes> refit(span<byte> blob, const boxes &of, refit_report *details = nullptr) noexcept
     {
         if (!of.is_sound())
@@ -1929,7 +1930,7 @@ public:
     template <class Blob, class Objects = span<const object>,
               std::enable_if_t<!detail::stays<Blob &&>::value || !detail::stays<Objects &&>::value, int> = 0>
     static result<scene> open(Blob &&, Objects &&) = delete;
-    /// Gives the scene in a blob other instances, as many as before, in place.
+    /// Gives the scene in a blob other instances, as many as before, in place, as `view::refit` does.
     static result<scene> refit(span<const instance> all, span<const object> of, span<byte> blob,
                                refit_report *details = nullptr) noexcept
     {
@@ -2110,22 +2111,22 @@ private:
     ::hgrid_scene raw_ = HGRID_SCENE_INIT;
 };
 
-/// Makes an object of a grid or view. Do not move the grid or view while a scene shows it: the scene shows nothing
-/// in its place then. A `std::vector` moves its grids when it grows.
+/// Makes an object of a grid or view. It keeps the address: do not move the grid or view while a scene shows it. A
+/// `std::vector` moves its elements when it grows.
 inline result<object> make_object(const view &of) noexcept
 {
     object made;
     const status answer = detail::said(::hgrid_object_grid(&of.c(), &made));
     return answer == status::ok ? result<object>(made) : answer;
 }
-/// Makes an object of a tree of shapes; it stays where it is.
+/// Makes an object of a tree of shapes. It keeps the address: the tree stays where it is.
 inline result<object> make_object(const shapes &of) noexcept
 {
     object made;
     const status answer = detail::said(::hgrid_object_shapes(&of.c(), &made));
     return answer == status::ok ? result<object>(made) : answer;
 }
-/// Makes an object of a scene; it stays where it is.
+/// Makes an object of a scene. It keeps the address: the scene stays where it is.
 inline result<object> make_object(const scene &of) noexcept
 {
     object made;

@@ -141,11 +141,72 @@ void check_normals()
     CHECK(is_near(hgrid::scene().normal(nothing, {{0, 0, 1}})[2], 0));
 }
 
+// A refit's view in the same variable is what a scene shows then. A vector with room keeps the addresses of its views.
+void check_objects_that_move()
+{
+    const std::vector<std::uint32_t> indices = {0, 1, 2};
+    const auto at = [](float z) {
+        return std::vector<std::array<float, 3>>{{{0, 0, z}}, {{1, 0, z}}, {{0, 1, z}}};
+    };
+    const auto corners = at(0), lower = at(-2), lowest = at(-4);
+    std::vector<hgrid::view> views;
+    std::vector<hgrid::shapes> trees;
+    std::vector<hgrid::scene> scenes;
+    views.reserve(2), trees.reserve(2), scenes.reserve(2);
+    auto view_index = hgrid::memory::allocate(hgrid::index_bound(1));
+    auto tree_index = hgrid::memory::allocate(hgrid::index_bound(1));
+    auto inner_index = hgrid::memory::allocate(hgrid::scene_bound(2));
+    auto outer_index = hgrid::memory::allocate(hgrid::scene_bound(1));
+    CHECK(view_index && tree_index && inner_index && outer_index);
+    const auto room = hgrid::as_writable_bytes(scratch);
+    views.push_back(*hgrid::view::build(hgrid::mesh(corners, indices), {}, *view_index, room));
+    // A floor that a test finds, beside the triangle.
+    float height = 0;
+    auto test = [&](std::uint32_t, const hgrid::ray &along, hgrid::shape_hit &found) {
+        found = hgrid::shape_hit{(height - along.origin[2]) / along.direction[2], 0, 0};
+        return true;
+    };
+    std::array<std::array<float, 6>, 1> box = {{{{4, 0, -0.1f, 5, 1, 0.1f}}}};
+    trees.push_back(*hgrid::shapes::build(hgrid::boxes(box, test), {}, *tree_index, room));
+    const std::array<hgrid::object, 2> inside = {{*hgrid::make_object(views[0]), *hgrid::make_object(trees[0])}};
+    const std::array<hgrid::instance, 2> both = {{hgrid::instance(0), hgrid::instance(1)}};
+    scenes.push_back(*hgrid::scene::build(both, inside, {}, *inner_index, room));
+    const std::array<hgrid::object, 1> outside = {{*hgrid::make_object(scenes[0])}};
+    const std::array<hgrid::instance, 1> all = {{hgrid::instance(0)}};
+    auto outer = hgrid::scene::build(all, outside, {}, *outer_index, room);
+    CHECK(outer);
+    const auto on_view = hgrid::make_ray_f64({0.25, 0.25, 1}, {0, 0, -1});
+    const auto on_tree = hgrid::make_ray_f64({4.5, 0.5, 1}, {0, 0, -1});
+    CHECK(is_near(outer->intersect(on_view)->t, 1) && is_near(outer->intersect(on_tree)->t, 1));
+    // There is room for one more of each.
+    views.emplace_back(), trees.emplace_back(), scenes.emplace_back();
+    CHECK(is_near(outer->intersect(on_view)->t, 1) && is_near(outer->intersect(on_tree)->t, 1));
+
+    height = -2;
+    box[0][2] = -2.1f, box[0][5] = -1.9f;
+    views[0] = *hgrid::view::refit(hgrid::mesh(lower, indices), *view_index);
+    trees[0] = *hgrid::shapes::refit(*tree_index, hgrid::boxes(box, test));
+    scenes[0] = *hgrid::scene::refit(both, inside, *inner_index);
+    *outer = *hgrid::scene::refit(all, outside, *outer_index);
+    CHECK(is_near(outer->intersect(on_view)->t, 3) && is_near(outer->intersect(on_tree)->t, 3));
+
+    // A grid does so itself.
+    auto owner = hgrid::grid::build(hgrid::mesh(corners, indices));
+    CHECK(owner);
+    const std::array<hgrid::object, 1> owned = {{*hgrid::make_object(*owner)}};
+    outer = hgrid::scene::build(all, owned, {}, *outer_index, room);
+    CHECK(outer && is_near(outer->intersect(on_view)->t, 1));
+    CHECK(owner->refit(hgrid::mesh(lowest, indices)));
+    *outer = *hgrid::scene::refit(all, owned, *outer_index);
+    CHECK(is_near(outer->intersect(on_view)->t, 5));
+}
+
 } // namespace
 
 void check_scenes()
 {
     check_normals();
+    check_objects_that_move();
     // Cubes in a row; the test finds hits on their fronts.
     std::vector<ball> all;
     for (int i = 0; i < 64; i++) {

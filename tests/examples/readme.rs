@@ -47,11 +47,18 @@ fn its_c_program_prints_the_hit() {
     assert_eq!(String::from_utf8(printed.stdout).as_deref(), Ok("hit at t = 1\n"));
 }
 
-/// Returns the first program of a page, and the output that the page shows for it.
-fn program_of(page: &str, language: &str) -> (String, String) {
+/// Returns the programs of a page, each with the output that the page shows below it.
+fn programs_of(page: &str, language: &str) -> Vec<(String, String)> {
     let page = self::page(page);
-    let (program, behind) = block(&page, language);
-    (program.to_owned(), block(behind, "text").0.to_owned())
+    let mut rest = page.as_str();
+    let mut programs = Vec::new();
+    while rest.contains(&format!("```{language}\n")) {
+        let (program, behind) = block(rest, language);
+        let (printed, behind) = block(behind, "text");
+        programs.push((program.to_owned(), printed.to_owned()));
+        rest = behind;
+    }
+    programs
 }
 
 /// Compiles a program of a page with the library, and returns what it prints.
@@ -66,11 +73,15 @@ fn printed(program: &str, mut compiler: Command, name: &str) -> String {
 
 #[test]
 fn the_programs_of_docs_print_what_they_say() {
-    let (program, expected) = program_of("docs/c.md", "c");
-    assert_eq!(printed(&program, warnings(compiler("c99"), "c99"), "prog.c"), expected);
-    let (program, expected) = program_of("docs/cpp.md", "cpp");
-    if let Some(compiler) = cpp_compiler("c++17") {
-        assert_eq!(printed(&program, compiler, "prog.cpp"), expected);
+    let [(program, expected)] = &programs_of("docs/c.md", "c")[..] else { panic!("one program") };
+    assert_eq!(printed(program, warnings(compiler("c99"), "c99"), "prog.c"), *expected);
+    let programs = programs_of("docs/cpp.md", "cpp");
+    assert_eq!(programs.len(), 2);
+    for (program, expected) in programs {
+        // The header is for all of these dialects, and so are its examples.
+        for compiler in ["c++14", "c++17", "c++20"].into_iter().filter_map(cpp_compiler) {
+            assert_eq!(printed(&program, compiler, "prog.cpp"), expected);
+        }
     }
 }
 
