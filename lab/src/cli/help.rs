@@ -30,6 +30,7 @@ Examples:
   hgrid render bunny.ply --json              the numbers, for programs
 
 Without a view, the camera stands in front of things, above flat scenes and within rooms, and sees three sides of a box.
+A face of more than three corners becomes a fan of triangles around the first one, as if it were convex.
 A mesh that a glTF file shows more than once is built once and shown by instances. It becomes triangles with
 --shading heat or normals, with methods other than bvh, and if an instance flattens it.";
 

@@ -2,7 +2,7 @@
 //!
 //! A scene is the two plain arrays that the core takes. Loaders write into them directly. They do not merge,
 //! reorder or repair anything, because a measurement should see the file as it is. They only cut faces with
-//! more than three corners into triangles.
+//! more than three corners into fans of triangles, as if all were convex.
 
 pub mod format;
 pub(crate) mod gltf;
