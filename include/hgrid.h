@@ -1489,7 +1489,7 @@ typedef struct hgrid_allocator {
 /**
  * Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts) overlaps other such
  * memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays. Answers of a batch are compared with
- * its rays and its scratch alone: vertices and answers may lie in the same structs.
+ * its rays and its scratch alone, because vertices and answers may be different fields of the same structs.
  */
 #define HGRID_ERROR_OVERLAP -4
 
@@ -2698,8 +2698,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * }
  * ```
  *
- * `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be if their size is 0;
- * `scene` may not be NULL.
+ * `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be NULL if their size
+ * is 0; `scene` may not be NULL.
  * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
  * writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,

@@ -37,7 +37,7 @@
  *
  * Lifetimes: meshes, boxes, views, scenes, options and configurations refer to what they were given:
  * arrays, blobs, objects, counters, callables. All of these must have a name, so that they are still
- * there when they are used; the compiler refuses temporaries.
+ * there when they are used. The compiler refuses temporaries, but for those that docs/cpp.md names.
  *
  * Threads: as in hgrid.h. Any number of threads may query one grid or view.
  *
@@ -830,7 +830,8 @@ private:
                       "a vertex has three coordinates");
         // A std::vector<float> is larger than three floats, too, but does not begin with them.
         static_assert(std::is_void<number>::value || std::is_trivially_destructible<V>::value,
-                      "a vertex holds its floats: std::vector keeps them elsewhere, std::array does not");
+                      "a vertex holds its floats: std::vector keeps them elsewhere, std::array does not; for a class with "
+                      "a destructor, name the field: hgrid::field(vertices, &vertex::position)");
         static_assert(is_double || has_floats,
                       "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
@@ -1194,8 +1195,8 @@ public:
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&) = delete;
     /// Gives the tree in a blob the boxes of a mesh whose vertices moved, in place; other views of the blob are of no
-    /// use any more. If an object keeps the address of one, assign the new view to that variable. After an error the
-    /// blob is as it was. Errors are those of `hgrid_refit`.
+    /// use any more. If an object was made of a view variable, assign the new view to the same variable. After an error
+    /// the blob is as it was. Errors are those of `hgrid_refit`.
     static result<view> refit(const mesh &of, span<byte> blob, refit_report *details = nullptr) noexcept
     {
         view moved;

@@ -304,8 +304,8 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// }
 /// ```
 ///
-/// `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be if their size is 0;
-/// `scene` may not be NULL.
+/// `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be NULL if their size
+/// is 0; `scene` may not be NULL.
 /// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
 /// writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,

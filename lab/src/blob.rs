@@ -29,7 +29,7 @@ impl Blob {
         file.read_exact(bytes).context("cannot read it")?;
         let needed = match BlobInfo::peek(bytes) {
             Err(Error::Truncated { needed_bytes, .. }) => {
-                bail!("it is cut off: it has {length} bytes, and its header alone {needed_bytes}")
+                bail!("it is cut off: it has {length} bytes, but its header takes {needed_bytes}")
             }
             info => info.context("it is not a blob that this version reads")?.total_bytes,
         };

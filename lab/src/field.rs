@@ -67,7 +67,7 @@ impl Field {
         f64::from(self.count).sqrt().ceil().max(1.0)
     }
 
-    /// Returns the box around all instances at any time.
+    /// Returns the box around all instances at any time, as long as no vertex of the mesh moves.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let reach = 0.5 * self.side() * STEP * self.extent;

@@ -77,7 +77,8 @@ struct MeshFacts {
     /// Triangles and vertices of all instances together.
     triangles: usize,
     vertices: usize,
-    /// The lowest and the highest corner of the box around its triangles, or around its vertices if it has none.
+    /// The lowest and the highest corner of the box around its triangles, or around its vertices if it has none and
+    /// shares no mesh.
     bounds: Option<[[f32; 3]; 2]>,
     up: &'static str,
     triangles_not_finite: usize,
@@ -211,8 +212,8 @@ impl MeshFacts {
         }
     }
 
-    /// The facts of a model whose meshes are shared, so that all its triangles may not fit into memory. Of these, flaws
-    /// are counted before they are transformed.
+    /// The facts of a model whose meshes are shared, so that all its triangles may not fit into memory. Triangles
+    /// with flaws are counted in each mesh, before its instances transform it.
     fn of_model(file: &str, format: &'static str, model: &Model, scene: Scene) -> Self {
         let Model { meshes, instances, .. } = model;
         let flaws: Vec<_> =

@@ -31,7 +31,7 @@ pub mod info;
 pub mod light;
 pub mod machine;
 pub mod measure;
-mod notices;
+pub mod notices;
 pub mod pack;
 pub mod pages;
 mod plot;

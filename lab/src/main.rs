@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use hgrid_lab::cli::{Cli, Command};
-use hgrid_lab::{animate, compare, figures, info, pack, pages, render, table, validate};
+use hgrid_lab::{animate, compare, figures, info, notices, pack, pages, render, table, validate};
 
 fn main() -> ExitCode {
     let cli = Cli::of_words(env::args_os().skip(1)).unwrap_or_else(|error| error.exit());
@@ -31,8 +31,7 @@ fn main() -> ExitCode {
         }
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // Not `eprintln`, which panics if nothing can be written.
-            let _ = writeln!(io::stderr(), "error: {}", message(&error));
+            notices::say(&format!("error: {}", message(&error)));
             ExitCode::FAILURE
         }
     }

@@ -10,6 +10,7 @@ use indicatif::HumanCount;
 
 use crate::blob::Blob;
 use crate::cli::blob::ValidateArgs;
+use crate::file;
 use crate::plural::{counted, triangles};
 use crate::render::seconds;
 use crate::scene::Scene;
@@ -23,9 +24,13 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let path = &args.blob;
     let file = path.display();
     let cannot = || format!("cannot read `{file}`");
-    let format = Format::of(path).with_context(cannot)?;
-    if format != Format::Blob {
-        bail!("`{file}` is {}, not a blob: `hgrid pack` makes one", format.article());
+    match Format::of(path) {
+        Ok(Format::Blob) => {}
+        Ok(format) => bail!("`{file}` is {}, not a blob: `hgrid pack` makes one", format.article()),
+        Err(_) if has_bytes(path) => {
+            bail!("`{file}` is not a blob: `hgrid pack` makes one of a mesh")
+        }
+        Err(error) => return Err(error.context(cannot())),
     }
     let blob = Blob::read(path).with_context(cannot)?;
     let info = BlobInfo::peek(blob.bytes())?;
@@ -70,6 +75,12 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
         "{file}: valid, a grid by {method} of {triangles}, proved in {time}{rest}"
     )?;
     Ok(())
+}
+
+/// Returns true if a file can be opened and is not empty.
+fn has_bytes(path: &Path) -> bool {
+    let length = file::open(path).and_then(|file| Ok(file.metadata()?.len()));
+    length.is_ok_and(|length| length > 0)
 }
 
 /// Tells of the bytes of the file behind the blob, which nothing reads; empty if there are none.

@@ -289,13 +289,22 @@ fn packed_files_are_described_proved_and_rendered() {
     fs::write(folder.0.join("cut.hgrid"), &blob[..blob.len() - 64]).unwrap();
     assert!(folder.fails("validate cut.hgrid").unwrap().contains("it is cut off"));
     fs::write(folder.0.join("stub.hgrid"), &blob[..60]).unwrap();
-    for command in ["info", "validate"] {
-        let said = folder.fails(&format!("{command} stub.hgrid")).unwrap();
-        let expected = "`stub.hgrid`: it is cut off: it has 60 bytes, and its header alone 128";
+    fs::write(folder.0.join("text"), "what is it?\n").unwrap();
+    for (words, expected) in [
+        (
+            "info stub.hgrid",
+            "`stub.hgrid`: it is cut off: it has 60 bytes, but its header takes 128",
+        ),
+        (
+            "validate stub.hgrid",
+            "`stub.hgrid`: it is cut off: it has 60 bytes, but its header takes",
+        ),
+        ("info text", "cannot read `text`: it has another format: a mesh is read from .ply"),
+        ("validate text", "`text` is not a blob: `hgrid pack` makes one of a mesh"),
+        ("validate none", "cannot read `none`: cannot open it"),
+    ] {
+        let said = folder.fails(words).unwrap();
         assert!(said.contains(expected), "{said}");
-        fs::write(folder.0.join("text"), "what is it?\n").unwrap();
-        let said = folder.fails(&format!("{command} text")).unwrap();
-        assert!(said.contains("cannot read `text`: it has another format"), "{said}");
     }
     fs::write(folder.0.join("long.hgrid"), [&blob[..], &[0; 3]].concat()).unwrap();
     let said = folder.says("validate long.hgrid").unwrap();
@@ -328,18 +337,37 @@ fn flat_meshes_are_seen_on_a_field() {
         let said = folder.says(&words).unwrap();
         assert!(said.contains("The scene of its instances has"), "{said}");
     }
-    // The same triangles count as flat in the mesh and in its blob.
+}
+
+#[test]
+fn flat_triangles_are_counted_alike_in_a_mesh_and_in_its_blob() {
+    let folder = Folder::new("counted").unwrap();
+    fs::write(folder.0.join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 2 0 0\nf 1 3 2\nf 1 2 4\n")
+        .unwrap();
     folder.says("pack flat.obj -o flat.hgrid").unwrap();
     for file in ["flat.obj", "flat.hgrid"] {
         let said = folder.says(&format!("info {file}")).unwrap();
         assert!(said.contains("without area  1 triangle"), "{said}");
     }
-    // All scenes are looked for before the first is measured.
+}
+
+#[test]
+fn all_scenes_are_looked_for_before_the_first_is_measured() {
+    let folder = Folder::new("looked").unwrap();
     for command in ["table", "figures -o charts"] {
-        let said = folder.fails(&format!("{command} procedural:knot:2K typo.ply")).unwrap();
-        assert!(said.contains("error: cannot load `typo.ply`: cannot open it"), "{said}");
-        assert!(!folder.0.join("charts").exists());
+        for (scene, expected) in [
+            ("typo.ply", "error: cannot load `typo.ply`: cannot open it"),
+            ("procedural:typo", "error: no scene `procedural:typo`: NAME in procedural:NAME is"),
+        ] {
+            let said = folder.fails(&format!("{command} procedural:knot:2K {scene}")).unwrap();
+            assert!(said.contains(expected), "{said}");
+            assert!(!folder.0.join("charts").exists());
+        }
     }
+    // Words of a file do not move the cursor.
+    fs::write(folder.0.join("odd.obj"), "v 0 \u{1b}[2J 0\n").unwrap();
+    let said = folder.fails("info odd.obj").unwrap();
+    assert!(said.contains("line 1: `\\u{1b}[2J` is no number"), "{said}");
 }
 
 #[test]

@@ -257,7 +257,7 @@ fn the_point_of_a_triangle_is_the_closest_one() {
             // Corners of Fibonacci numbers: this triangle is 2^-48 as high as long.
             6 => triangle = fibonacci,
             // 2^-42 as high as long: the place below the point is off by 2^-13 of the length, and seems to lie inside.
-            7 => (triangle, point) = narrow,
+            7 if round < 30 => (triangle, point) = narrow,
             _ => {}
         }
         triangle.rotate_left(round / 10 % 3);

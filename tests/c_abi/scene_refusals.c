@@ -100,6 +100,7 @@ static void what_shapes_refuse(void)
     EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate_shapes(&view, scratch, SCRATCH_BYTES));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, copy, 64));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, (void *)(uintptr_t)boxes.boxes, 4));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, (void *)(uintptr_t)boxes.masks, 4));
 }
 
 static void what_scenes_refuse(void)

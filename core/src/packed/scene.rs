@@ -161,8 +161,8 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
     /// [`ALIGNMENT`](crate::ALIGNMENT), [`Error::OtherContent`] an object that is shapes, which are the
-    /// caller's, those of [`Grid::open`] a grid whose blob is damaged. Nothing is written then. After those of
-    /// [`Grid::pack`] `to` holds nothing of use.
+    /// caller's. If the blob of a grid is damaged, the error is one of [`Grid::open`]. In all these cases nothing is
+    /// written. After an error of [`Grid::pack`] `to` holds nothing of use.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -201,7 +201,7 @@ impl<'a> Scene<'a> {
         self.blob
     }
 
-    /// The place of the object that a hit names; `None` if there is no such object, triangle or shape.
+    /// The place of the object that a hit names.
     fn place(&self, hit: &SceneHit) -> Option<Place<'a>> {
         let mut instances = [None; MAX_NESTING];
         let mut scene = *self;
@@ -225,13 +225,15 @@ impl<'a> Scene<'a> {
     }
 
     /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives
-    /// it.
+    /// it. `None` if the path of the hit does not end at an object that has this triangle or shape; its numbers behind
+    /// the end must be [`INVALID_ID`].
     #[must_use]
     pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
         self.place(hit)?.instances().next_back()?.instance()
     }
 
-    /// The object that a hit names: the grid or the shapes at the end of its path.
+    /// The object that a hit names: the grid or the shapes at the end of its path. `None` as for
+    /// [`instance_of`](Self::instance_of).
     #[must_use]
     pub fn object_of(&self, hit: &SceneHit) -> Option<Object<'a>> {
         Some(*self.place(hit)?.object)

@@ -5,6 +5,7 @@
 //! which the model tells: the scene is at rest.
 
 mod accessor;
+mod hidden;
 
 use core::ops::Range;
 use std::fs;
@@ -19,27 +20,14 @@ use gltf::mesh::Mode;
 use gltf::{Document, Gltf, Primitive, Semantic};
 
 use self::accessor::{check_sparse, is_inside, positions};
+use self::hidden::{hidden, is_known};
 use super::format::Format;
 use super::model::{IDENTITY, Mesh, Model, Transform};
 use crate::file;
-use crate::plural::{counted, noun};
 use crate::vector::round;
 
 /// A matrix in `f64`, so that the product of a chain of nodes is rounded once.
 type Matrix = [[f64; 4]; 3];
-
-/// The first words of extensions that change materials, textures and lights, and leave triangles alone.
-const LOOKS: [&str; 6] = [
-    "KHR_materials_",
-    "KHR_texture_",
-    "KHR_lights_",
-    "EXT_texture_",
-    "EXT_lights_",
-    "MSFT_texture_",
-];
-
-/// The extension of positions that are whole numbers of 8 or 16 bits.
-const QUANTIZED: &str = "KHR_mesh_quantization";
 
 /// The start of the message for a file that the crate refuses, mostly because it breaks a rule of the format.
 const INVALID: &str = "it is no glTF that hgrid reads";
@@ -85,40 +73,6 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
-/// Counts what the file has and this reader ignores, in words: points and lines, animations, skins, morph targets,
-/// cameras and extensions.
-fn hidden(document: &Document) -> Vec<String> {
-    let has_targets =
-        |mesh: &gltf::Mesh<'_>| mesh.primitives().any(|part| part.morph_targets().len() > 0);
-    let targets = document.meshes().filter(has_targets).count();
-    let parts = document.meshes().flat_map(|mesh| mesh.primitives());
-    let without_triangles = parts.filter(|part| !has_triangles(part.mode())).count();
-    [
-        (without_triangles, "mesh of points or lines", "meshes of points or lines"),
-        (document.animations().len(), "animation", "animations"),
-        (document.skins().len(), "skin", "skins"),
-        (targets, "mesh with morph targets", "meshes with morph targets"),
-        (document.cameras().len(), "camera", "cameras"),
-    ]
-    .into_iter()
-    .filter(|&(count, ..)| count > 0)
-    .map(|(count, one, many)| counted(count, one, many))
-    .chain(of_extensions(document))
-    .collect()
-}
-
-/// Names the extensions that may add to what is shown, and are neither read nor required.
-fn of_extensions(document: &Document) -> Option<String> {
-    let unknown: Vec<_> = document.extensions_used().filter(|name| !is_known(name)).collect();
-    let extensions = noun(unknown.len(), "extension", "extensions");
-    (!unknown.is_empty()).then(|| format!("{extensions} {}", unknown.join(", ")))
-}
-
-/// Returns true for an extension that is read, or changes only how surfaces look.
-fn is_known(extension: &str) -> bool {
-    extension == QUANTIZED || LOOKS.iter().any(|start| extension.starts_with(start))
-}
-
 /// Refuses versions of glTF other than 2: their files have the same endings.
 fn check_version(version: &str) -> Result<()> {
     let is_read = version == "2" || version.starts_with("2.");
@@ -134,8 +88,7 @@ fn invalid(error: &gltf::Error) -> Error {
     anyhow!("{INVALID}: {reason}")
 }
 
-/// Parses and checks a file. [`QUANTIZED`] and extensions that change how surfaces look are allowed even if the file
-/// requires them.
+/// Parses and checks a file. Extensions [that are known](is_known) are allowed even if the file requires them.
 fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     // Some editors write a mark of the encoding first.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -358,12 +311,12 @@ mod tests {
         floats.chain([2u16, 0, 1].into_iter().flat_map(u16::to_le_bytes)).collect()
     }
 
-    fn as_text() -> String {
+    pub(super) fn as_text() -> String {
         let text = BASE64_STANDARD.encode(bytes());
         json(&format!(r#""uri": "data:application/octet-stream;base64,{text}""#))
     }
 
-    fn read_text(text: &str) -> Result<Model> {
+    pub(super) fn read_text(text: &str) -> Result<Model> {
         read(text.as_bytes(), Path::new("no/such/scene.gltf"))
     }
 
@@ -450,17 +403,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn extensions_that_are_not_read_are_told_of() {
-        let used =
-            r#""extensionsUsed": ["KHR_materials_unlit", "EXT_mesh_gpu_instancing"], "asset""#;
-        let text = as_text().replacen(r#""mode": 0"#, r#""mode": 4"#, 1);
-        let hidden = read_text(&text.replacen(r#""asset""#, used, 1)).unwrap().hidden;
-        assert_eq!(hidden, ["extension EXT_mesh_gpu_instancing"]);
-        let model = read_text(&format!("\u{feff}{text}")).unwrap();
-        assert!(model.hidden.is_empty());
-    }
-
     /// Only the bytes of a buffer are read from the file that it names, and only from a file.
     #[test]
     fn buffers_are_read_as_far_as_they_go() {
@@ -470,6 +412,8 @@ mod tests {
         let of = |name: &str| read(json(&format!(r#""uri": "{name}""#)).as_bytes(), &path);
         fs::write(folder.join("long.bin"), [bytes(), vec![7; 99]].concat()).unwrap();
         assert_eq!(of("long.bin").unwrap(), read_text(&as_text()).unwrap());
+        let (document, _) = parse(json(r#""uri": "long.bin""#).as_bytes()).unwrap();
+        assert_eq!(buffers(&document, None, &folder).unwrap(), [bytes()]);
         let message = format!("{:#}", of("..").unwrap_err());
         assert!(message.ends_with("it is a folder: name a file in it"), "{message}");
         if cfg!(unix) {
@@ -477,30 +421,6 @@ mod tests {
             assert!(message.contains("it is a pipe or a device"), "{message}");
         }
         fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn extensions_for_looks_are_no_hindrance() {
-        let names =
-            r#""extensionsRequired": ["KHR_materials_unlit", "KHR_texture_basisu"], "asset""#;
-        let texture = r#""textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}], "#;
-        let text = as_text().replacen(r#""asset""#, &[texture, names].concat(), 1);
-        assert_eq!(read_text(&text).unwrap(), read_text(&as_text()).unwrap());
-    }
-
-    #[test]
-    fn what_is_not_shown_is_told() {
-        let target = r#""targets": [{"POSITION": 0}], "attributes""#;
-        let text = as_text().replacen(r#""attributes""#, target, 1);
-        let more = r#""animations": [{"channels": [], "samplers": []}, {"channels": [], "samplers": []}],
-            "skins": [{"joints": [0]}],
-            "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}], "asset""#;
-        let model = read_text(&text.replacen(r#""asset""#, more, 1)).unwrap();
-        let expected =
-            "1 mesh of points or lines, 2 animations, 1 skin, 1 mesh with morph targets, 1 camera";
-        assert_eq!(model.hidden_in("a.glb"), [format!("a.glb: not shown: {expected}")]);
-        let all_shown = as_text().replacen(r#""mode": 0"#, r#""mode": 4"#, 1);
-        assert!(read_text(&all_shown).unwrap().hidden_in("a.glb").is_empty());
     }
 
     #[test]

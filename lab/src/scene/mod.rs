@@ -72,19 +72,18 @@ impl Scene {
     /// # Errors
     /// The errors of [`load`](Self::load).
     pub fn open(spec: &OsStr, takes_instances: bool) -> Result<(Self, Option<Model>)> {
-        let (path, source) = (Path::new(spec), Source::of(spec)?);
-        let spec = spec.display();
-        match source {
+        let path = Path::new(spec);
+        match Source::of(spec)? {
             Source::Pair(inner, outer) => {
                 return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
             }
             Source::Formula(words) => {
-                let scene =
-                    procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
+                let scene = procedural::make(words).with_context(|| no_scene(spec))?;
                 return Ok((scene, None));
             }
             Source::File => {}
         }
+        let spec = spec.display();
         let (format, model) = read_model(path).with_context(|| format!("cannot load `{spec}`"))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let hidden = model.hidden_in(&spec);
@@ -217,9 +216,9 @@ impl<'s> Source<'s> {
         }
         if !path.exists() && Format::named(path).is_none() {
             bail!(
-                "no scene `{}`: name a file that ends in {ENDINGS}, or procedural:NAME:TRIANGLES, \
+                "{}: name a file that ends in {ENDINGS}, or procedural:NAME:TRIANGLES, \
                  where NAME is {}; or one inside another, A+B",
-                spec.display(),
+                no_scene(spec),
                 procedural::NAMES.join(", ")
             );
         }
@@ -227,10 +226,15 @@ impl<'s> Source<'s> {
     }
 }
 
+/// Returns the start of the message for words that name no scene.
+fn no_scene(spec: &OsStr) -> String {
+    format!("no scene `{}`", spec.display())
+}
+
 /// Splits A+B behind the first file that is there: its name may have a plus, too.
 fn pair(text: &str) -> Option<(&str, &str)> {
     let pluses = || text.match_indices('+').map(|(at, _)| (&text[..at], &text[at + 1..]));
-    pluses().find(|(inner, _)| Path::new(inner).exists()).or_else(|| pluses().next())
+    pluses().find(|(inner, _)| Path::new(inner).is_file()).or_else(|| pluses().next())
 }
 
 /// Looks at the words of scenes and at the starts of their files, before long work with the first of them.
@@ -242,7 +246,7 @@ pub(crate) fn check(scenes: &[impl AsRef<OsStr>]) -> Result<()> {
         let spec = spec.as_ref();
         match Source::of(spec)? {
             Source::Pair(inner, outer) => check(&[inner, outer])?,
-            Source::Formula(_) => {}
+            Source::Formula(words) => procedural::check(words).with_context(|| no_scene(spec))?,
             Source::File => {
                 let format = Format::of(Path::new(spec));
                 format.with_context(|| format!("cannot load `{}`", spec.display()))?;
@@ -252,11 +256,11 @@ pub(crate) fn check(scenes: &[impl AsRef<OsStr>]) -> Result<()> {
     Ok(())
 }
 
-/// Returns a word of a file in quotes for a message: its first letters, and none that would move the cursor.
+/// Returns a word of a file in quotes for a message: its first letters, if it has many.
 pub(crate) fn quoted(word: &str) -> String {
     let start: String = word.chars().take(40).collect();
     let rest = if start.len() < word.len() { "..." } else { "" };
-    format!("`{}{rest}`", start.escape_debug())
+    format!("`{start}{rest}`")
 }
 
 /// Returns true if the core takes a triangle as finite.
@@ -322,8 +326,9 @@ mod tests {
 
     #[test]
     fn names_of_files_may_have_a_plus() {
-        let folder = std::env::temp_dir().join(format!("hgrid+plus-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        let folder = std::env::temp_dir().join(format!("hgrid-plus-{}", std::process::id()));
+        // A folder is no scene: what stands before the first plus is none.
+        std::fs::create_dir_all(folder.join("a")).unwrap();
         let file = folder.join("a+b.obj");
         std::fs::write(&file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
         let file = file.to_str().unwrap();
@@ -336,13 +341,14 @@ mod tests {
             let message = format!("{message:#}");
             assert!(message.starts_with("cannot load `none.obj`: cannot open it"), "{message}");
         }
+        let message = format!("{:#}", check(&["procedural:knot", "procedural:typo"]).unwrap_err());
+        assert!(message.starts_with("no scene `procedural:typo`: NAME in"), "{message}");
         std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
-    fn words_in_messages_are_short_and_plain() {
+    fn words_in_messages_are_short() {
         assert_eq!(quoted("zero"), "`zero`");
-        assert_eq!(quoted("\u{1b}[2J"), "`\\u{1b}[2J`");
         assert_eq!(quoted(&"7".repeat(41)), format!("`{}...`", "7".repeat(40)));
     }
 

@@ -99,8 +99,8 @@ impl Model {
 
     /// Returns the box around all finite triangles of all instances, or `None` if there are none.
     ///
-    /// The box around a mesh tells how far an instance may reach. For each side of the box around all, instances are
-    /// looked at from the one that may reach the farthest on, as long as they may reach farther than those before.
+    /// The box around a mesh tells how far an instance may reach. For each side, instances are visited in the order of
+    /// how far they may reach, until the next may reach no farther than a vertex that was found.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let is_used: Vec<_> = self.meshes.iter().map(Mesh::is_used).collect();
@@ -108,36 +108,37 @@ impl Model {
         let boxes: Vec<_> =
             of_meshes.map(|(mesh, is_used)| bounds(mesh.vertices(is_used))).collect();
         let mut waiting = Vec::with_capacity(self.instances.len());
-        let mut corners = [[0.0; 3]; 2];
+        let mut is_visited = vec![false; self.instances.len()];
+        let mut found: Option<Bounds> = None;
         for axis in 0..3 {
-            for (side, corner) in corners.iter_mut().enumerate() {
-                let sign = [-1.0, 1.0][side];
+            for is_up in [false, true] {
+                let sign = if is_up { 1.0 } else { -1.0 };
                 for (place, (mesh, transform)) in self.instances.iter().enumerate() {
                     let Some(of_mesh) = boxes.get(*mesh).copied().flatten() else { continue };
-                    let farthest = farthest(transform, of_mesh, axis, side == 1);
+                    let farthest = farthest(transform, of_mesh, axis, is_up);
                     let reach = sign * moved(transform, farthest)[axis];
                     // A transform that is not finite may reach anywhere.
                     waiting.push((if reach.is_nan() { f32::INFINITY } else { reach }, place));
                 }
                 waiting.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-                let mut most = f32::NEG_INFINITY;
                 while let Some((reach, place)) = waiting.pop() {
-                    let is_behind = reach <= most;
-                    if is_behind {
+                    let side = found.map(|(min, max)| sign * if is_up { max } else { min }[axis]);
+                    if side.is_some_and(|side| reach <= side) {
                         break;
+                    }
+                    if core::mem::replace(&mut is_visited[place], true) {
+                        continue;
                     }
                     let (mesh, transform) = &self.instances[place];
                     let vertices = self.meshes[*mesh].vertices(&is_used[*mesh]);
-                    let finite = vertices.map(|vertex| moved(transform, vertex)).filter(is_finite);
-                    most = finite.map(|vertex| sign * vertex[axis]).fold(most, f32::max);
+                    let of_instance = bounds(vertices.map(|vertex| moved(transform, vertex)));
+                    let corners = [found, of_instance].into_iter().flatten();
+                    found = bounds(corners.flat_map(|(min, max)| [min, max]));
                 }
                 waiting.clear();
-                // A zero without a sign.
-                corner[axis] = sign * most + 0.0;
             }
         }
-        let [min, max] = corners;
-        is_finite(&min).then_some((min, max))
+        found
     }
 
     /// Returns the triangles of all instances as one mesh.
@@ -145,7 +146,7 @@ impl Model {
     /// Fronts of triangles stay fronts: a mirroring transform swaps two corners.
     ///
     /// # Errors
-    /// If it would have more than 2^32 vertices, or there is not enough memory for it.
+    /// If it would have more than 2^32 vertices, or the system refuses the memory for it.
     pub fn flatten(mut self) -> Result<Mesh> {
         if let ([_], [(0, IDENTITY)]) = (&*self.meshes, &*self.instances) {
             return Ok(self.meshes.pop().unwrap_or_default());
@@ -297,9 +298,8 @@ mod tests {
         assert_eq!(Model::default().bounds(), None);
     }
 
-    /// The box of many instances is that of all their vertices, bit for bit.
     #[test]
-    fn instances_that_cannot_reach_farther_are_passed_over() {
+    fn the_box_of_instances_is_that_of_all_their_vertices() {
         let mut state = 1_u32;
         let mut number = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -319,6 +319,9 @@ mod tests {
                     }
                     if round % 50 == 0 && k == 7 {
                         transform[0] = [3e38; 4];
+                    }
+                    if round % 50 == 1 && k == 8 {
+                        transform[2] = [f32::INFINITY, f32::NEG_INFINITY, 0.0, 0.0];
                     }
                     (k % 2, transform)
                 })

@@ -73,7 +73,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model> {
 /// Returns true for a line with a vertex or a face, which may go on in the next line. Names and comments may end in a
 /// backslash, too.
 fn is_element(line: &[u8]) -> bool {
-    matches!(line.trim_ascii_start(), [b'v' | b'f', b' ' | b'\t', ..])
+    matches!(line.trim_ascii_start(), [b'v' | b'f', b' ' | b'\t' | b'\\', ..])
 }
 
 /// Reads the coordinates of a vertex. A weight or a colour may follow.
@@ -103,7 +103,7 @@ fn face(words: &str, vertices: usize, corners: &mut Vec<u32>) -> Result<()> {
         let corner = u32::try_from(from_zero).ok().filter(|&corner| corner < u32::MAX);
         corners.push(corner.with_context(|| format!("there is no vertex {index}"))?);
     }
-    ensure!(corners.len() >= 3, "a face has three corners or more, this one {}", corners.len());
+    ensure!(corners.len() >= 3, "a face has three corners or more, this one has {}", corners.len());
     Ok(())
 }
 
@@ -131,11 +131,11 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Joins a line with the next one as long as it ends in a backslash.
+    /// Joins a line with the next one as long as it ends in a backslash that belongs to no comment.
     fn join<'j>(&mut self, line: &[u8], joined: &'j mut Vec<u8>) -> &'j [u8] {
         joined.clear();
         joined.extend_from_slice(line.trim_ascii_end());
-        while joined.last() == Some(&b'\\') {
+        while joined.last() == Some(&b'\\') && !joined.contains(&b'#') {
             joined.pop();
             joined.push(b' ');
             joined.extend_from_slice(self.next().unwrap_or_default().trim_ascii_end());
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn backslashes_and_comments_end_where_they_should() {
-        let text = b"# C:\\models\\\nv 0 0 0 # first\nv 1 0 0\nv 0 1 0\nusemtl a\\\nf 1 2 3#last\nf 1 2 \\ \n 3\n";
+        let text = b"# C:\\models\\\nv 0 0 0 # a\\\nv 1 0 0\nv\\\n0 1 0\nusemtl a\\\nf 1 2 3#b\nf 1 2 \\ \n 3\n";
         let mesh = mesh(text);
         assert_eq!((mesh.positions.len(), &*mesh.indices), (3, &[[0, 1, 2]; 2][..]));
     }
@@ -211,7 +211,7 @@ mod tests {
             (b"v 0 0 0\nf 1 0 1\n", "line 2: there is no vertex 0: vertices count from 1"),
             (b"v 0 0 0\nf 1 -2 1\n", "line 2: there is no vertex -2"),
             (b"v 0 0 0\nf 1 a 1\n", "line 2: `a` is no corner"),
-            (b"v 0 0 0\nf 1 1\n", "line 2: a face has three corners or more, this one 2"),
+            (b"v 0 0 0\nf 1 1\n", "line 2: a face has three corners or more, this one has 2"),
             (b"v 0 0 0\nf 1 1 9999999999\n", "line 2: there is no vertex 9999999999"),
             (b"\xff\xfe\x00\x01\n", "line 1: it is not text"),
             (

@@ -31,16 +31,34 @@ const MAX_TRIANGLES: u32 = 100_000_000;
 const FLOOR_SQUARES: u32 = 10;
 const FLOOR_SCALE: f64 = 80.0;
 
+/// A function that makes a scene of so many triangles.
+type Formula = fn(u32) -> Scene;
+
 /// Makes the scene of `NAME` or `NAME:TRIANGLES`, with `TRIANGLES` like 5000, 20K or 3M.
 ///
 /// # Errors
 /// If there is no such scene or the count is not in range.
 pub fn make(words: &str) -> Result<Scene> {
+    let (name, generate, triangles) = parse(words)?;
+    let scene = generate(triangles);
+    Ok(Scene { name: format!("procedural:{name}:{}", scene.indices.len()), ..scene })
+}
+
+/// Looks whether [`make`] would make a scene.
+///
+/// # Errors
+/// The errors of [`make`].
+pub(crate) fn check(words: &str) -> Result<()> {
+    parse(words).map(|_| ())
+}
+
+/// Returns the name of a scene, the function that makes it, and its number of triangles.
+fn parse(words: &str) -> Result<(&str, Formula, u32)> {
     let (name, count) = match words.split_once(':') {
         Some((name, count)) => (name, Some(count)),
         None => (words, None),
     };
-    let (generate, default): (fn(u32) -> Scene, _) = match name {
+    let (generate, default): (Formula, _) = match name {
         "knot" => (knot, DEFAULT_KNOT),
         "stage" => (stage, DEFAULT_STAGE),
         "soup" => (soup, DEFAULT_SOUP),
@@ -50,8 +68,7 @@ pub fn make(words: &str) -> Result<Scene> {
     let Some(triangles) = triangles.filter(|count| (1..=MAX_TRIANGLES).contains(count)) else {
         bail!("TRIANGLES in procedural:{name}:TRIANGLES is a number from 1 to 100M");
     };
-    let scene = generate(triangles);
-    Ok(Scene { name: format!("procedural:{name}:{}", scene.indices.len()), ..scene })
+    Ok((name, generate, triangles))
 }
 
 /// Parses a whole number, with `K` for thousands or `M` for millions.

@@ -72,9 +72,9 @@ pub(super) fn starts_with_solid(bytes: &[u8]) -> bool {
 fn ascii(text: &str) -> Result<Mesh> {
     let mut positions = Vec::new();
     let mut is_complete = true;
-    // Lines may end as those of old Macs do.
-    let ends = if text.contains('\n') { '\n' } else { '\r' };
-    let mut lines = (1..).zip(text.split_terminator(ends)).peekable();
+    // Lines may end as those of Windows or old Macs do.
+    let text = text.replace("\r\n", "\n").replace('\r', "\n");
+    let mut lines = (1..).zip(text.lines()).peekable();
     let mut facet = 0;
     while let Some((number, line)) = lines.next() {
         let result = read_line(line, &mut positions, &mut facet, &mut is_complete);
@@ -105,14 +105,16 @@ fn read_line(
             let corner = corner.and_then(|corner| <[f32; 3]>::try_from(corner).ok());
             positions.push(corner.context("`vertex` should have three numbers behind it")?);
         }
-        "endfacet" => {
+        "facet" | "endfacet" => {
             let count = positions.len() - *facet;
-            ensure!(count == 3, "a facet has three vertices, this one has {count}");
+            // A facet may have no end of its own.
+            let is_start = count == 0 && first.eq_ignore_ascii_case("facet");
+            ensure!(is_start || count == 3, "a facet has three vertices, this one has {count}");
             *facet = positions.len();
         }
         "solid" => *is_complete = false,
         "endsolid" => *is_complete = true,
-        "facet" | "outer" | "endloop" | "color" => {}
+        "outer" | "endloop" | "color" => {}
         _ => bail!("{} is no word of an STL file", quoted(first)),
     }
     Ok(())
@@ -168,17 +170,26 @@ mod tests {
         assert_eq!(mesh(TEXT.repeat(3).as_bytes()).indices.len(), 3);
         assert_eq!(mesh(TEXT.replace('\n', "\r").as_bytes()), mesh(TEXT.as_bytes()));
         assert_eq!(mesh(TEXT.replace('\n', "\r\n").as_bytes()), mesh(TEXT.as_bytes()));
+        let mixed = TEXT.replace('\n', "\r").replace("endsolid\r", "endsolid\n");
+        assert_eq!(mesh(mixed.as_bytes()), mesh(TEXT.as_bytes()));
+        let open = TEXT.repeat(2).replace(" endfacet\nendsolid\nsolid\n", "");
+        assert_eq!(mesh(open.as_bytes()).indices.len(), 2);
         assert_eq!(mesh(&file(b"", 0)), Mesh::default());
     }
 
     /// Some programs that write as they go leave the number of triangles zero.
     #[test]
     fn triangles_that_are_not_counted_are_told_of() {
-        let mut bytes = file(b"", 3);
-        bytes[80] = 1;
-        let model = read(&bytes).unwrap();
-        assert_eq!(model.meshes[0].indices.len(), 1);
-        assert_eq!(model.hidden, ["100 bytes behind the 1 triangle of its header"]);
+        for (count, expected) in [
+            (0, "150 bytes behind the 0 triangles of its header"),
+            (1, "100 bytes behind the 1 triangle of its header"),
+        ] {
+            let mut bytes = file(b"", 3);
+            bytes[80] = count;
+            let model = read(&bytes).unwrap();
+            assert_eq!(model.meshes[0].indices.len(), usize::from(count));
+            assert_eq!(model.hidden, [expected]);
+        }
         assert!(read(&file(b"", 3)).unwrap().hidden.is_empty());
     }
 

@@ -47,10 +47,12 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Model> {
     let header = match Parser::<Skipped>::new().read_header(&mut reader) {
         Ok(header) => header,
         Err(error) => {
-            let is_at_end = reader.into_inner().fill_buf()?.is_empty();
-            ensure!(!is_at_end, "it is cut off within its header: fetch or export it again");
             let text = error.to_string();
-            bail!("its header is damaged: {}", text.lines().next().unwrap_or_default())
+            let reason = text.lines().next().unwrap_or_default();
+            if reader.into_inner().fill_buf()?.is_empty() {
+                bail!("it is cut off within its header, or the last line is damaged: {reason}")
+            }
+            bail!("its header is damaged: {reason}")
         }
     };
     let vertices = header.elements.get("vertex").map(|vertex| vertex.count);
@@ -388,13 +390,25 @@ mod tests {
 
     #[test]
     fn faces_without_a_triangle_are_told_of_in_any_encoding() {
+        let all = |bytes: &[u8]| read(bytes, bytes.len() as u64).unwrap();
+        assert!(all(&ascii()).hidden.is_empty());
         let text = String::from_utf8(ascii()).unwrap();
-        let read = |text: &str| read(text.as_bytes(), text.len() as u64).unwrap();
-        assert!(read(&text).hidden.is_empty());
-        let fewer = text.replacen("4 0 1 2 3 9\n3 3 2 1 9\n", "2 0 1 9\n0 9\n", 1);
-        let model = read(&fewer);
-        assert!(model.meshes[0].indices.is_empty());
-        assert_eq!(model.hidden, ["2 faces of fewer than three corners"]);
+        let text = text.replacen("4 0 1 2 3 9\n3 3 2 1 9\n", "2 0 1 9\n0 9\n", 1);
+        let cut = |mut bytes: Vec<u8>, first: u8| {
+            // The faces are the last 17 + 1 and 13 + 1 bytes.
+            bytes.truncate(bytes.len() - 32);
+            bytes.extend([2, 0, 0, 0, 0, first, 0, 0, 1 - first, 9, 0, 9]);
+            bytes
+        };
+        for bytes in [
+            text.into_bytes(),
+            cut(binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes), 1),
+            cut(binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes), 0),
+        ] {
+            let model = all(&bytes);
+            assert!(model.meshes[0].indices.is_empty());
+            assert_eq!(model.hidden, ["2 faces of fewer than three corners"]);
+        }
     }
 
     #[test]
@@ -407,6 +421,13 @@ mod tests {
             "ply\nformat ascii {header}0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 1 4\n0\n3 0 1 2 3 1 2 3 9\n3 0 1 2 3 2 3 0 9\n"
         );
         assert_eq!(read_all(text.as_bytes()).unwrap().indices, [[1, 2, 3], [2, 3, 0]]);
+        let header = "element vertex 3\nproperty char x\nproperty char y\nproperty char z\nelement face 1\n\
+            property list uchar uchar vertex_indices\nproperty list uchar uchar vertex_index\nend_header\n";
+        for order in ["little", "big"] {
+            let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{header}").into_bytes();
+            bytes.extend([0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2, 3, 2, 1, 0]);
+            assert_eq!(read_all(&bytes).unwrap().indices, [[2, 1, 0]], "{order}");
+        }
     }
 
     #[test]
@@ -436,8 +457,8 @@ mod tests {
             assert!(!message.is_empty());
         }
         for length in 4..file.windows(10).position(|it| it == b"end_header").unwrap() {
-            let expected = "it is cut off within its header: fetch or export it again";
-            assert_eq!(message(&file[..length]), expected, "{length}");
+            let expected = "it is cut off within its header, or the last line is damaged: ";
+            assert!(message(&file[..length]).starts_with(expected), "{length}");
         }
         let cut = message(&file[..file.len() - 8]);
         assert_eq!(cut, "it is cut off after 1 of 2 `face` elements: fetch or export it again");
