@@ -830,8 +830,8 @@ private:
                       "a vertex has three coordinates");
         // A std::vector<float> is larger than three floats, too, but does not begin with them.
         static_assert(std::is_void<number>::value || std::is_trivially_destructible<V>::value,
-                      "a vertex holds its floats: std::vector keeps them elsewhere, std::array does not; for a class with "
-                      "a destructor, name the field: hgrid::field(vertices, &vertex::position)");
+                      "a vertex holds its floats: std::vector keeps them elsewhere, std::array does not; for a class "
+                      "with a destructor, name the field: hgrid::field(vertices, &vertex::position)");
         static_assert(is_double || has_floats,
                       "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
