@@ -486,7 +486,9 @@ typedef struct hgrid_part {
  * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
  *
  * The arrays are read where they lie, never copied and never changed, and not one byte behind the
- * last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
+ * last element's own bytes. They need no alignment, so all may be fields of the caller's structs. The
+ * bytes between two vertices may be read, and have no influence: during a call nobody may write them,
+ * not even a batch its answers.
  * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
  * struct itself is only read during the call.
  */
@@ -893,8 +895,8 @@ typedef struct hgrid_query_options {
     struct hgrid_counters *counters;
     /**
      * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
-     * any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, for shapes neither
-     * boxes nor view. Each thread needs its own. A filter or test that starts a batch must pass other
+     * any alignment and hold anything. It may overlap neither rays, answers, blob nor view, nor the mesh or the
+     * boxes. Each thread needs its own. A filter or test that starts a batch must pass other
      * scratch. Queries of one ray or point do not look at it.
      */
     void *scratch;
@@ -1489,7 +1491,7 @@ typedef struct hgrid_allocator {
 /**
  * Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts) overlaps other such
  * memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays. Answers of a batch are compared with
- * its rays and its scratch alone, because vertices and answers may be different fields of the same structs.
+ * its rays and its scratch alone.
  */
 #define HGRID_ERROR_OVERLAP -4
 
@@ -2178,8 +2180,8 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
  * hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
  * side. Neither array needs any alignment, and bytes between elements are neither read nor written.
- * No hit may overlap a ray, nor anything else that the call uses, such as blob and mesh, which the call
- * does not check; if rays and hits interleave, their strides must be equal.
+ * No hit may overlap a ray, nor anything else that the call uses, such as blob and mesh with the bytes
+ * between its vertices, which the call does not check; if rays and hits interleave, their strides must be equal.
  *
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
  * the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
@@ -2516,7 +2518,7 @@ hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
  * scratch.
  *
  * Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
- * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes or masks, or
+ * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes, masks or view, or
  * `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
@@ -2703,8 +2705,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
  * writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
- *   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too; what an inner scene shows is not,
- *   and must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+ *   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too, against `scene` the view alone; what
+ *   an inner scene shows is not, and must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
  *   `HGRID_ERROR_INSTANCE_MATRIX`;
  * - with the objects: `HGRID_ERROR_TOO_DEEP`;
@@ -2731,7 +2733,8 @@ hgrid_status hgrid_build_scene(const struct hgrid_instance *instances,
  *
  * `blob` and `scene` may not be NULL; `objects` may be if there are none. Returns `HGRID_OK` and writes the view to
  * `scene`; or returns what `hgrid_open` returns, `HGRID_ERROR_OTHER_CONTENT` for a blob that is no scene,
- * `HGRID_ERROR_MISSING_OBJECTS` or `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
+ * `HGRID_ERROR_OVERLAP` if `scene` is the view of an object, `HGRID_ERROR_MISSING_OBJECTS` or
+ * `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
  */
@@ -2790,7 +2793,8 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
  *
  * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
  * cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`
- * (also for a cleared view of a grid among the objects), `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+ * (also for a cleared view among the objects), what `hgrid_open_scene` returns if the blob of one of the scenes was
+ * lost, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
  * `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
  * or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
  * needed is not touched.

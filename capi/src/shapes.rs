@@ -185,7 +185,7 @@ pub unsafe extern "C" fn hgrid_refit_shapes(
 /// scratch.
 ///
 /// Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
-/// zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes or masks, or
+/// zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, its boxes, masks or view, or
 /// `HGRID_ERROR_NULL_ARGUMENT`.
 ///
 /// Threads: any number of calls and queries on the same tree at once, each with scratch of its own.

@@ -130,7 +130,9 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 /// A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
 ///
 /// The arrays are read where they lie, never copied and never changed, and not one byte behind the
-/// last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
+/// last element's own bytes. They need no alignment, so all may be fields of the caller's structs. The
+/// bytes between two vertices may be read, and have no influence: during a call nobody may write them,
+/// not even a batch its answers.
 /// Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
 /// struct itself is only read during the call.
 #[repr(C)]
@@ -355,7 +357,9 @@ impl hgrid_config {
         if config.method() != Method::Bvh {
             return Err(HGRID_ERROR_INVALID_METHOD);
         }
-        self.bound(instance_count, report)?;
+        // Noted last: after an error the report is empty.
+        let mut of_tree = hgrid_report::empty(report.struct_size);
+        self.bound(instance_count, &mut of_tree)?;
         let count = u32::try_from(instance_count).ok();
         let bound = count.and_then(|count| Scene::bound_parallel(count, &config, tasks));
         report.note_sizes(&bound.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?);

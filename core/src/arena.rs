@@ -29,15 +29,9 @@ impl Sizes {
     pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
         let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
         let index_bytes = index_bytes.min(largest);
-        let fit = |needed_bytes: u64, region| {
-            let too_small = Error::out_of_memory(region, needed_bytes, usize::MAX as u64);
-            usize::try_from(needed_bytes).map_err(|_| too_small)
-        };
-        Ok(Self {
-            index_bytes: fit(index_bytes, Region::Index)?,
-            scratch_bytes: fit(scratch_bytes, Region::Scratch)?,
-            is_exact,
-        })
+        let fit = |bytes: u64| usize::try_from(bytes).map_err(|_| Error::TooManyTriangles);
+        let (index_bytes, scratch_bytes) = (fit(index_bytes)?, fit(scratch_bytes)?);
+        Ok(Self { index_bytes, scratch_bytes, is_exact })
     }
 }
 

@@ -27,7 +27,8 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     match Format::of(path) {
         Ok(Format::Blob) => {}
         Ok(format) => bail!("`{file}` is {}, not a blob: `hgrid pack` makes one", format.article()),
-        Err(_) if has_bytes(path) => {
+        // Of a name without an ending, the error would say which meshes are read.
+        Err(_) if Format::named(path).is_none() && has_bytes(path) => {
             bail!("`{file}` is not a blob: `hgrid pack` makes one of a mesh")
         }
         Err(error) => return Err(error.context(cannot())),

@@ -319,6 +319,7 @@ static void scratch_is_nobody_elses(void)
         {HGRID_ERROR_OVERLAP, &all.hits[COUNT - 1], sizeof(hgrid_hit) + 3},
         {HGRID_ERROR_OVERLAP, mesh_data.positions, 4},
         {HGRID_ERROR_OVERLAP, mesh_data.indices, 400},
+        {HGRID_ERROR_OVERLAP, (char *)&grid + sizeof grid / 2, 1},
         {HGRID_OK, all.rays, 0},
         {HGRID_OK, NULL, 0},
         {HGRID_ERROR_NULL_ARGUMENT, NULL, 16},

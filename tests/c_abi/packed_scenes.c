@@ -147,7 +147,7 @@ static void what_is_refused(void)
     /* Blobs of other content. */
     uint64_t bytes;
     hgrid_scene view;
-    hgrid_grid none = HGRID_GRID_INIT;
+    hgrid_grid none;
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack(&grid, NULL, 0, &bytes));
     void *packed = guarded((size_t)bytes);
     EXPECT(HGRID_OK, hgrid_pack(&grid, packed, (size_t)bytes, &bytes));
@@ -167,23 +167,6 @@ static void what_is_refused(void)
     EXPECT(HGRID_ERROR_MISALIGNED, hgrid_pack_scene(&scene, copy + 8, n, &bytes));
     const hgrid_scene zeros = HGRID_SCENE_INIT;
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&zeros, copy, n, &bytes));
-
-    /* A view that was cleared, behind one that was not: nothing is written, and no size is told. */
-    hgrid_grid cleared = grid;
-    hgrid_object pair[2];
-    hgrid_instance both[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
-    both[1].object = 1;
-    EXPECT(HGRID_OK, hgrid_object_grid(&grid, &pair[0]));
-    EXPECT(HGRID_OK, hgrid_object_grid(&cleared, &pair[1]));
-    EXPECT(HGRID_OK, hgrid_build_scene(both, 2, pair, 2, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
-                                       SCRATCH_BYTES, &view, NULL));
-    cleared = none;
-    memset(copy, 3, n);
-    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, NULL, 0, &bytes));
-    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, copy, n, &bytes));
-    for (size_t i = 0; i < n; i++)
-        CHECK(copy[i] == 3);
-    CHECK(bytes == 7);
 
     /* The test of a shape is code, which cannot be stored. */
     static const float box[6] = {0, 0, 0, 1, 1, 1};
@@ -205,6 +188,63 @@ static void what_is_refused(void)
     mesh_data.indices[5][1] = VERTICES;
     EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_pack_scene(&scene, copy, n, &bytes));
     mesh_data.indices[5][1] = was;
+}
+
+/* Views of objects that were cleared or overwritten after the scene was built. */
+static void lost_views_are_refused(void)
+{
+    const size_t n = file_bytes;
+    const hgrid_scene zeros = HGRID_SCENE_INIT;
+    const hgrid_grid none = HGRID_GRID_INIT;
+    char *const copy = (char *)guarded((n + 63) / 64 * 64);
+    uint64_t bytes = 7;
+    hgrid_scene view;
+
+    /* A view that was cleared, behind one that was not: nothing is written, and no size is told. */
+    hgrid_grid cleared = grid;
+    hgrid_object pair[2];
+    hgrid_instance both[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
+    both[1].object = 1;
+    EXPECT(HGRID_OK, hgrid_object_grid(&grid, &pair[0]));
+    EXPECT(HGRID_OK, hgrid_object_grid(&cleared, &pair[1]));
+    EXPECT(HGRID_OK, hgrid_build_scene(both, 2, pair, 2, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
+                                       SCRATCH_BYTES, &view, NULL));
+    cleared = none;
+    memset(copy, 3, n);
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, NULL, 0, &bytes));
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&view, copy, n, &bytes));
+    for (size_t i = 0; i < n; i++)
+        CHECK(copy[i] == 3);
+    CHECK(bytes == 7);
+
+    /* The same with a view of a scene; and one that was overwritten by the view of the scene that shows it. */
+    static hgrid_scene inside, outside;
+    hgrid_object shown;
+    const hgrid_instance one = HGRID_INSTANCE_INIT;
+    EXPECT(HGRID_OK, hgrid_build_scene(&one, 1, &pair[0], 1, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
+                                       SCRATCH_BYTES, &inside, NULL));
+    EXPECT(HGRID_OK, hgrid_object_scene(&inside, &shown));
+    void *const index = guarded(INDEX_BYTES);
+    EXPECT(HGRID_OK, hgrid_build_scene(&one, 1, &shown, 1, NULL, index, INDEX_BYTES, scratch, SCRATCH_BYTES,
+                                       &outside, NULL));
+    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack_scene(&outside, NULL, 0, &bytes));
+    bytes = 7;
+    const hgrid_scene was_inside = inside;
+    inside = zeros;
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&outside, copy, n, &bytes));
+    inside = outside;
+    EXPECT(HGRID_ERROR_TOO_DEEP, hgrid_pack_scene(&outside, NULL, 0, &bytes));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_pack_scene(&outside, copy, n, &bytes));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_scene(&outside, scratch, SCRATCH_BYTES));
+    const hgrid_ray_f64 ray = ray_of(0);
+    hgrid_scene_hit nothing;
+    CHECK(!hgrid_intersect_scene(&outside, &ray, NULL, &nothing));
+    inside = was_inside;
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_build_scene(&one, 1, &shown, 1, NULL, index, INDEX_BYTES, scratch,
+                                                  SCRATCH_BYTES, &inside, NULL));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_open_scene(index, INDEX_BYTES, &shown, 1, &inside));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_refit_scene(&one, 1, &shown, 1, index, INDEX_BYTES, &inside, NULL));
+    CHECK(bytes == 7);
 }
 
 #define REFUSED(parameter, call) \
@@ -248,6 +288,7 @@ int main(void)
     prepare();
     a_packed_scene_needs_nothing_else();
     what_is_refused();
+    lost_views_are_refused();
     no_pointers();
     return 0;
 }

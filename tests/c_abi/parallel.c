@@ -170,6 +170,17 @@ static void any_number_of_tasks_builds_the_same_bytes(void)
         const uint32_t tasks = i < 9 ? i : more[i - 9];
         if (is_part && i % 4 != 0)
             continue;
+        /* The bounds are those of as many tasks as there may be. */
+        plan nobody = plan_of(ONCE, 1);
+        const hgrid_config asked = in_parallel(serially, &nobody, tasks);
+        const hgrid_config least = in_parallel(serially, &nobody, tasks < HGRID_MAX_TASKS ? tasks : HGRID_MAX_TASKS);
+        hgrid_report bound = HGRID_REPORT_INIT, same = HGRID_REPORT_INIT;
+        EXPECT(HGRID_OK, hgrid_bound(mesh.triangle_count, &asked, &bound));
+        EXPECT(HGRID_OK, hgrid_bound(mesh.triangle_count, &least, &same));
+        CHECK(bound.scratch_bytes == same.scratch_bytes && bound.index_bytes == same.index_bytes);
+        EXPECT(HGRID_OK, hgrid_scene_bound(mesh.triangle_count, &asked, &bound));
+        EXPECT(HGRID_OK, hgrid_scene_bound(mesh.triangle_count, &least, &same));
+        CHECK(bound.scratch_bytes == same.scratch_bytes && bound.index_bytes == same.index_bytes);
         for (int which = ONCE; which <= BACKWARDS; which++) {
             plan p = plan_of((loop)which, 1);
             const hgrid_config config = in_parallel(serially, &p, tasks);

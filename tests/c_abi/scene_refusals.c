@@ -101,6 +101,7 @@ static void what_shapes_refuse(void)
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, copy, 64));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, (void *)(uintptr_t)boxes.boxes, 4));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, (void *)(uintptr_t)boxes.masks, 4));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, &view, sizeof view));
 }
 
 static void what_scenes_refuse(void)

@@ -461,13 +461,14 @@ fn shares(mesh: &TriangleMesh<'_>, addresses: Addresses) -> bool {
         || mesh.parts().iter().any(|part| has(part.mesh()))
 }
 
-/// Bytes to write that lie in neither blob nor mesh.
+/// Bytes to write that lie in neither view nor blob nor mesh.
 ///
 /// # Safety
 /// The contract of [`grid`].
 unsafe fn bytes_beside(grid: &Grid<'_>, to: RawRegion) -> Result<&'static mut [u8], hgrid_status> {
-    let is_shared =
-        addresses_of(grid.blob()).overlaps(to.addresses()) || shares(grid.mesh(), to.addresses());
+    let is_shared = addresses_of_view(grid).overlaps(to.addresses())
+        || addresses_of(grid.blob()).overlaps(to.addresses())
+        || shares(grid.mesh(), to.addresses());
     if is_shared {
         return Err(HGRID_ERROR_OVERLAP);
     }

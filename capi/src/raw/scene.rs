@@ -8,8 +8,8 @@ use core::ptr::NonNull;
 use core::slice;
 
 use hgrid_core::{
-    ALIGNMENT, BlobInfo, Content, Counters, Cull, Instance, Member, Object, Scene, SceneHit,
-    SceneOptions, SceneSurface, Verdict,
+    ALIGNMENT, BlobInfo, Content, Counters, Cull, Instance, MAX_NESTING, Member, Object, Scene,
+    SceneHit, SceneOptions, SceneSurface, Verdict,
 };
 
 use super::batch::{BatchArrays, RunningBatch};
@@ -131,6 +131,7 @@ pub(crate) unsafe fn build_scene(
     let (instances, addresses) = unsafe { instances(given) }?;
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
+    check_view(to, objects)?;
     // SAFETY: the caller's promise.
     let (config, caller) = unsafe { config(settings) }?;
     // SAFETY: the caller's promise.
@@ -139,7 +140,7 @@ pub(crate) unsafe fn build_scene(
         Scene::build_with(instances, objects, &config, index, scratch, control)
     });
     let count = u32::try_from(instances.len()).ok();
-    let bound = count.and_then(|count| Scene::bound_parallel(count, &config, caller.tasks));
+    let bound = count.and_then(|count| Scene::bound(count, &config));
     let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
     report.note_built(built.blob(), bound);
     report.reference_count = built.instance_count();
@@ -159,6 +160,7 @@ pub(crate) unsafe fn open_scene(
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
+    check_view(to, objects)?;
     // SAFETY: the caller's promise.
     let blob = unsafe { bytes(blob, blob_bytes) }?;
     let opened = Scene::open(blob, objects).map_err(status_of)?;
@@ -185,6 +187,7 @@ pub(crate) unsafe fn refit_scene(
     let (instances, addresses) = unsafe { instances(given) }?;
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
+    check_view(to, objects)?;
     // SAFETY: the caller's promise.
     let [blob, _] = unsafe { apart_from(addresses, objects, [blob, RawRegion::NONE]) }?;
     let refitted = Scene::refit(blob, instances, objects);
@@ -215,11 +218,30 @@ pub(crate) unsafe fn validate_scene(
 
 /// Returns true if a scene reads something that lies in a range of addresses.
 fn reads(scene: &Scene<'_>, addresses: Addresses) -> bool {
+    reads_within(scene, addresses, MAX_NESTING)
+}
+
+/// The same, with so many scenes inside one another at most. True if there are more: then a view was overwritten after
+/// the scene was built, and may even show itself.
+fn reads_within(scene: &Scene<'_>, addresses: Addresses, most: usize) -> bool {
+    let Some(most) = most.checked_sub(1) else { return true };
     let within = |object: &Object<'_>| match object {
-        Object::Scene(inner) => reads(inner, addresses),
+        Object::Scene(inner) => reads_within(inner, addresses, most),
         _ => touches(object, addresses),
     };
     holds(scene, addresses) || scene.objects().iter().any(within)
+}
+
+/// Refuses to write the view of a scene over the view of an object that the scene shows.
+fn check_view(to: NonNull<hgrid_scene>, objects: &[Object<'_>]) -> Result<(), hgrid_status> {
+    let to = Addresses::new(to.as_ptr().cast(), size_of::<hgrid_scene>());
+    let is_over = |object: &Object<'_>| match object {
+        Object::Grid(grid) => addresses_of_view(*grid).overlaps(to),
+        Object::Scene(scene) => addresses_of_view(*scene).overlaps(to),
+        Object::Shapes(_, test) => addresses_of_view(*test).overlaps(to),
+        Object::Nothing => false,
+    };
+    if objects.iter().any(is_over) { Err(HGRID_ERROR_OVERLAP) } else { Ok(()) }
 }
 
 /// Returns true if a view of a scene, its blob or its array of objects lies in a range of addresses.

@@ -136,7 +136,7 @@ pub(crate) unsafe fn build_shapes(
     let [index, scratch] = unsafe { apart(inputs, memory) }?;
     let built =
         controlled(caller, |control| Shapes::build_with(boxes, &config, index, scratch, control));
-    let bound = Sizes::bound_parallel(boxes.count(), &config, caller.tasks);
+    let bound = Sizes::bound(boxes.count(), &config);
     let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
     report.note_built(built.blob(), bound);
     report.skipped_count = built.skipped_count();
@@ -206,7 +206,8 @@ pub(crate) unsafe fn validate_shapes(
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let tested = unsafe { shapes(view) }?;
-    if shapes_read(&tested.shapes, scratch.addresses()) {
+    let addresses = scratch.addresses();
+    if addresses_of_view(tested).overlaps(addresses) || shapes_read(&tested.shapes, addresses) {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.

@@ -82,6 +82,8 @@ pub(super) const fn bytes(triangles: u32, quality: Quality, tasks: u32) -> (u64,
 const fn fast_bound(triangles: u32, tasks: u32) -> (u64, u64) {
     let nodes = most_nodes(triangles) as u64;
     let triangles = triangles as u64;
+    let most = Control::MAX_TASKS;
+    let tasks = if tasks > most { most } else { tasks };
     let tasks = if tasks < 1 { 1 } else { tasks } as u64;
     let index = index_bytes(triangles, nodes, most_fine(triangles));
     (index, scratch_bytes(triangles, tasks, triangles))
@@ -96,8 +98,7 @@ pub(crate) fn sizes(
     control: &Control<'_>,
 ) -> Result<Sizes, Error> {
     check_count(mesh)?;
-    let (index, needed) =
-        bytes(mesh.triangle_count(), quality, control.tasks.clamp(1, Control::MAX_TASKS));
+    let (index, needed) = bytes(mesh.triangle_count(), quality, control.tasks);
     if control.tasks <= 1 && scratch.len() as u64 >= needed {
         let watch = &Watch::none();
         let header = header_of(mesh, quality, flags, None, scratch, &Control::SERIAL, watch)?;

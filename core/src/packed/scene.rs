@@ -22,6 +22,7 @@ use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::error::{Error, Region};
 use crate::grid::Grid;
 use crate::invariant::OrBug;
+use crate::limits::MAX_NESTING;
 use crate::method::Content;
 use crate::ray::INVALID_ID;
 use crate::scene::{Object, Scene};
@@ -124,18 +125,30 @@ impl<'a> Scene<'a> {
         result
     }
 
+    /// Proves that no more than so many scenes stand inside one another. The views of scenes count, not what they
+    /// noted when they were built: a view may have been overwritten since, even by one that shows itself.
+    fn check_depth(&self, most: usize) -> Result<(), Error> {
+        let most = most.checked_sub(1).ok_or(Error::TooDeep)?;
+        for object in self.named() {
+            if let Object::Scene(inner) = object {
+                inner.check_depth(most)?;
+            }
+        }
+        Ok(())
+    }
+
     fn plan(&self) -> Result<PackedSizes, Error> {
+        // Before anything is written: views and blobs may have been lost since the scene was built.
+        self.check_depth(MAX_NESTING)?;
+        Self::open(self.blob(), self.objects())?;
         let (mut members, mut references) = (0_u32, u64::from(self.object_count));
         let mut bytes = self.blob().len() as u64;
         self.each_member(&mut |object| {
             members = members.checked_add(1).ok_or(Error::TooManyTriangles)?;
             match object {
-                Object::Grid(grid) => {
-                    // Before anything is written: the view may be an empty one.
-                    let packed = grid.packed_sections()?;
-                    bytes = bytes.saturating_add(packed.end);
-                }
+                Object::Grid(grid) => bytes = bytes.saturating_add(grid.packed_sections()?.end),
                 Object::Scene(scene) => {
+                    Self::open(scene.blob(), scene.objects())?;
                     references = references.saturating_add(scene.object_count.into());
                     bytes = bytes.saturating_add(scene.blob().len() as u64);
                 }
@@ -161,8 +174,8 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
     /// [`ALIGNMENT`](crate::ALIGNMENT), [`Error::OtherContent`] an object that is shapes, which are the
-    /// caller's. If the blob of a grid is damaged, the error is one of [`Grid::open`]. In all these cases nothing is
-    /// written. After an error of [`Grid::pack`] `to` holds nothing of use.
+    /// caller's. If the blob of a grid or a scene is damaged, the error is one of [`Grid::open`] or
+    /// [`open`](Self::open). In all these cases nothing is written. After an error of [`Grid::pack`] `to` holds nothing of use.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -159,7 +159,7 @@ impl<'a> Scene<'a> {
         let space = usize::try_from(behind).ok();
         let room = (index.len() & !(ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
         // The size of the tree is known only once it is built: ask for the bound.
-        let most = Self::bound(count, config).map_or(u64::MAX, |sizes| sizes.index_bytes as u64);
+        let most = Self::bound(count, config).ok_or(Error::TooManyTriangles)?.index_bytes as u64;
         let room = room.ok_or(short(most.saturating_sub(behind)))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
         let boxes = fill(tail, instances, objects, short(0))?;
