@@ -187,7 +187,7 @@ pub struct hgrid_query_options {
     /// by one to be counted.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
-    /// any alignment and hold anything. It may overlap neither rays, answers, blob nor view, nor the mesh or the
+    /// any alignment and hold anything. It may overlap none of these: rays, answers, view, blob, mesh,
     /// boxes. Each thread needs its own. A filter or test that starts a batch must pass other
     /// scratch. Queries of one ray or point do not look at it.
     pub scratch: *mut c_void,

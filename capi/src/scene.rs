@@ -305,12 +305,14 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// ```
 ///
 /// `instances` may be NULL if there are none, and `objects` likewise; `index` and `scratch` may be NULL if their size
-/// is 0; `scene` may not be NULL.
-/// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
-/// writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
+/// is 0; `scene` may not be NULL. `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be
+/// NULL. Index and scratch are compared with view, blob and arrays of each object, `scene` with each object's view
+/// alone. What an inner scene shows is not looked at, and must lie elsewhere.
+///
+/// Returns `HGRID_OK` and writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index
+/// holds nothing of use:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
-///   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too, against `scene` the view alone; what
-///   an inner scene shows is not, and must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+///   `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
 /// - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
 ///   `HGRID_ERROR_INSTANCE_MATRIX`;
 /// - with the objects: `HGRID_ERROR_TOO_DEEP`;
@@ -352,7 +354,8 @@ pub unsafe extern "C" fn hgrid_build_scene(
 ///
 /// `blob` and `scene` may not be NULL; `objects` may be if there are none. Returns `HGRID_OK` and writes the view to
 /// `scene`; or returns what `hgrid_open` returns, `HGRID_ERROR_OTHER_CONTENT` for a blob that is no scene,
-/// `HGRID_ERROR_OVERLAP` if `scene` is the view of an object, `HGRID_ERROR_MISSING_OBJECTS` or
+/// `HGRID_ERROR_OVERLAP` if `scene` is the view of an object (what an object that is a scene shows is not looked at,
+/// and must lie elsewhere), `HGRID_ERROR_MISSING_OBJECTS` or
 /// `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
 ///
 /// Threads: any number of calls at once, also on the same blob, each with a view of its own.
@@ -445,10 +448,10 @@ pub unsafe extern "C" fn hgrid_validate_scene(
 ///
 /// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
 /// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`
-/// (also for a cleared view among the objects), what `hgrid_open_scene` returns if the blob of one of the scenes was
-/// lost, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
-/// `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
-/// or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
+/// (also for a cleared view among the objects), `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing. If the blob of one of the scenes was overwritten,
+/// it returns what `hgrid_open_scene` returns for that, and has written nothing, either. Or it returns
+/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
 /// needed is not touched.
 ///
 /// Threads: any number of calls and queries on the same scene at once, each with memory of its own.

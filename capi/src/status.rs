@@ -28,7 +28,8 @@ pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
 /// Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts) overlaps other such
 /// memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays. Answers of a batch are compared with
-/// its rays and its scratch alone.
+/// its rays and its scratch alone. Calls that look through all that a scene shows return it, too, if a view was
+/// overwritten so that more scenes stand inside one another than `HGRID_MAX_NESTING`.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
 /// The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `hgrid_pack_scene` and

@@ -131,8 +131,9 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 ///
 /// The arrays are read where they lie, never copied and never changed, and not one byte behind the
 /// last element's own bytes. They need no alignment, so all may be fields of the caller's structs. The
-/// bytes between two vertices may be read, and have no influence: during a call nobody may write them,
-/// not even a batch its answers.
+/// bytes between two vertices may be read, and have no influence. Nobody may write them during a call: so
+/// a batch's answers may not lie there.
+///
 /// Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
 /// struct itself is only read during the call.
 #[repr(C)]

@@ -199,7 +199,13 @@ fn fits(
     Ok(needed)
 }
 
-/// Returns true if a coarser grid may succeed: too high a density counts as too large.
+/// Returns true if a coarser grid may succeed: one of too high a density counts as too large, and so does one that has
+/// no room among the machine's addresses.
 const fn is_too_large(error: Error) -> bool {
-    matches!(error, Error::OutOfMemory { .. } | Error::InvalidConfig(ConfigField::Density))
+    matches!(
+        error,
+        Error::OutOfMemory { .. }
+            | Error::TooManyTriangles
+            | Error::InvalidConfig(ConfigField::Density)
+    )
 }

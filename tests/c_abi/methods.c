@@ -288,7 +288,7 @@ static void a_proof_takes_the_scratch_that_it_asks_for(const built *b)
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, b->index + b->blob_bytes - 1, 64));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, mesh_data.indices, sizeof(uint32_t)));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, mesh_data.positions, 1));
-    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, (void *)(uintptr_t)&b->grid, sizeof b->grid));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, (void *)(uintptr_t)&b->grid, 4));
     EXPECT_PROOF(HGRID_OK, &b->grid);
 }
 

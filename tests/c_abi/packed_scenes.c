@@ -229,6 +229,9 @@ static void lost_views_are_refused(void)
                                        &outside, NULL));
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack_scene(&outside, NULL, 0, &bytes));
     bytes = 7;
+    const hgrid_ray_f64 ray = ray_of(50);
+    hgrid_scene_hit found;
+    CHECK(hgrid_intersect_scene(&outside, &ray, NULL, &found));
     const hgrid_scene was_inside = inside;
     inside = zeros;
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&outside, copy, n, &bytes));
@@ -236,10 +239,12 @@ static void lost_views_are_refused(void)
     EXPECT(HGRID_ERROR_TOO_DEEP, hgrid_pack_scene(&outside, NULL, 0, &bytes));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_pack_scene(&outside, copy, n, &bytes));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_scene(&outside, scratch, SCRATCH_BYTES));
-    const hgrid_ray_f64 ray = ray_of(0);
-    hgrid_scene_hit nothing;
-    CHECK(!hgrid_intersect_scene(&outside, &ray, NULL, &nothing));
+    CHECK(!hgrid_intersect_scene(&outside, &ray, NULL, &found));
     inside = was_inside;
+    CHECK(hgrid_intersect_scene(&outside, &ray, NULL, &found));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_scene(&outside, &outside, 4));
+    for (size_t i = 0; i < n; i++)
+        CHECK(copy[i] == 3);
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_build_scene(&one, 1, &shown, 1, NULL, index, INDEX_BYTES, scratch,
                                                   SCRATCH_BYTES, &inside, NULL));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_open_scene(index, INDEX_BYTES, &shown, 1, &inside));

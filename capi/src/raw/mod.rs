@@ -32,6 +32,7 @@ mod scene;
 mod shapes;
 
 use core::ffi::c_void;
+use core::mem::offset_of;
 use core::ptr::{NonNull, null_mut};
 use core::slice;
 
@@ -446,6 +447,11 @@ fn addresses_of_view<T: ?Sized>(view: &T) -> Addresses {
     Addresses::new(core::ptr::from_ref(view).cast(), size_of_val(view))
 }
 
+/// Returns the addresses of a caller's view `V`, by what stands in it behind its tag.
+fn addresses_around<V, T>(inside: &T, tag_bytes: usize) -> Addresses {
+    Addresses::new(core::ptr::from_ref(inside).wrapping_byte_sub(tag_bytes).cast(), size_of::<V>())
+}
+
 /// Returns true if a mesh reads something that lies in a range of addresses.
 fn shares(mesh: &TriangleMesh<'_>, addresses: Addresses) -> bool {
     let has = |mesh: &TriangleMesh<'_>| {
@@ -466,7 +472,8 @@ fn shares(mesh: &TriangleMesh<'_>, addresses: Addresses) -> bool {
 /// # Safety
 /// The contract of [`grid`].
 unsafe fn bytes_beside(grid: &Grid<'_>, to: RawRegion) -> Result<&'static mut [u8], hgrid_status> {
-    let is_shared = addresses_of_view(grid).overlaps(to.addresses())
+    let view = addresses_around::<hgrid_grid, _>(grid, offset_of!(StoredGrid, grid));
+    let is_shared = view.overlaps(to.addresses())
         || addresses_of(grid.blob()).overlaps(to.addresses())
         || shares(grid.mesh(), to.addresses());
     if is_shared {

@@ -3,7 +3,7 @@
 //! "The caller's promise" is the contract at the head of `raw` (mod.rs).
 
 use core::ffi::c_void;
-use core::mem::MaybeUninit;
+use core::mem::{MaybeUninit, offset_of};
 use core::ptr::NonNull;
 use core::slice;
 
@@ -16,8 +16,8 @@ use super::batch::{BatchArrays, RunningBatch};
 use super::query::add;
 use super::shapes::shapes_read;
 use super::{
-    addresses_of, addresses_of_view, apart, bytes, bytes_mut, config, read, read_sized, shares,
-    write, write_grid,
+    addresses_around, addresses_of, addresses_of_view, apart, bytes, bytes_mut, config, read,
+    read_sized, shares, write, write_grid,
 };
 use crate::addresses::{Addresses, RawRegion};
 use crate::blob_types::hgrid_refit_report;
@@ -216,9 +216,10 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
-/// Returns true if a scene reads something that lies in a range of addresses.
+/// Returns true if something lies in a range of addresses that the scene of a caller's view reads, or that view.
 fn reads(scene: &Scene<'_>, addresses: Addresses) -> bool {
-    reads_within(scene, addresses, MAX_NESTING)
+    let view = addresses_around::<hgrid_scene, _>(scene, offset_of!(SceneView, scene));
+    view.overlaps(addresses) || reads_within(scene, addresses, MAX_NESTING)
 }
 
 /// The same, with so many scenes inside one another at most. True if there are more: then a view was overwritten after

@@ -125,8 +125,8 @@ impl<'a> Scene<'a> {
         result
     }
 
-    /// Proves that no more than so many scenes stand inside one another. The views of scenes count, not what they
-    /// noted when they were built: a view may have been overwritten since, even by one that shows itself.
+    /// Proves that no more than so many scenes stand inside one another as their views are now. What they noted when
+    /// they were built may be wrong: a view may have been overwritten since, even by one that shows itself.
     fn check_depth(&self, most: usize) -> Result<(), Error> {
         let most = most.checked_sub(1).ok_or(Error::TooDeep)?;
         for object in self.named() {
@@ -137,10 +137,18 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
+    /// Proves that the blob is still the one that this view was made of, as far as its length and its objects tell.
+    fn check_blob(&self) -> Result<(), Error> {
+        let now = Self::open(self.blob(), self.objects())?;
+        let is_same =
+            now.object_count == self.object_count && now.blob().len() == self.blob().len();
+        if is_same { Ok(()) } else { Err(corrupt(offset_of!(Header, blob_bytes))) }
+    }
+
     fn plan(&self) -> Result<PackedSizes, Error> {
-        // Before anything is written: views and blobs may have been lost since the scene was built.
+        // Before anything is written: views and blobs may have been overwritten since the scene was built.
         self.check_depth(MAX_NESTING)?;
-        Self::open(self.blob(), self.objects())?;
+        self.check_blob()?;
         let (mut members, mut references) = (0_u32, u64::from(self.object_count));
         let mut bytes = self.blob().len() as u64;
         self.each_member(&mut |object| {
@@ -148,7 +156,7 @@ impl<'a> Scene<'a> {
             match object {
                 Object::Grid(grid) => bytes = bytes.saturating_add(grid.packed_sections()?.end),
                 Object::Scene(scene) => {
-                    Self::open(scene.blob(), scene.objects())?;
+                    scene.check_blob()?;
                     references = references.saturating_add(scene.object_count.into());
                     bytes = bytes.saturating_add(scene.blob().len() as u64);
                 }
@@ -175,7 +183,8 @@ impl<'a> Scene<'a> {
     /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
     /// [`ALIGNMENT`](crate::ALIGNMENT), [`Error::OtherContent`] an object that is shapes, which are the
     /// caller's. If the blob of a grid or a scene is damaged, the error is one of [`Grid::open`] or
-    /// [`open`](Self::open). In all these cases nothing is written. After an error of [`Grid::pack`] `to` holds nothing of use.
+    /// [`open`](Self::open). In all these cases nothing is written. After an error of [`Grid::pack`] `to` holds
+    /// nothing of use.
     ///
     /// ```
     /// # use hgrid_core::*;
