@@ -354,9 +354,9 @@ pub unsafe extern "C" fn hgrid_build_scene(
 ///
 /// `blob` and `scene` may not be NULL; `objects` may be if there are none. Returns `HGRID_OK` and writes the view to
 /// `scene`; or returns what `hgrid_open` returns, `HGRID_ERROR_OTHER_CONTENT` for a blob that is no scene,
-/// `HGRID_ERROR_OVERLAP` if `scene` is the view of an object (what an object that is a scene shows is not looked at,
-/// and must lie elsewhere), `HGRID_ERROR_MISSING_OBJECTS` or
-/// `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
+/// `HGRID_ERROR_OVERLAP` if `scene` is the view of an object, `HGRID_ERROR_MISSING_OBJECTS` or
+/// `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was. What an inner scene shows is not compared with `scene`, and
+/// must lie elsewhere.
 ///
 /// Threads: any number of calls at once, also on the same blob, each with a view of its own.
 ///

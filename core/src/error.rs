@@ -76,8 +76,8 @@ pub enum Error {
     },
     /// The mesh description contradicts itself.
     InvalidMesh(MeshField),
-    /// More triangles, boxes or instances than the method takes: 2^31 in a tree, else [`limits::MAX_TRIANGLES`];
-    /// or memory for them that the machine has no addresses for.
+    /// More triangles, boxes or instances than the method takes: 2^31 in a tree, else [`limits::MAX_TRIANGLES`]; or
+    /// they need more memory than the machine can address.
     TooManyTriangles,
     /// A triangle names a vertex that the mesh does not have.
     IndexOutOfRange {

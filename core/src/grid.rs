@@ -52,8 +52,8 @@ impl<'a> Grid<'a> {
     /// # Errors
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT), [`Error::NonFiniteTriangle`] the
-    /// triangle; [`Error::InvalidConfig`] the field, [`Error::MethodLeftOut`] the method; [`Error::TooManyTriangles`]
-    /// a mesh that is too large. After an error the index
+    /// triangle; [`Error::InvalidConfig`] the field, [`Error::MethodLeftOut`] the method. A mesh that is too large is
+    /// answered with [`Error::TooManyTriangles`]. After an error the index
     /// region is unchanged, except with trees, variable and recursive grids, which write to it while they build: then
     /// it holds nothing of use. Both regions can be used again.
     ///

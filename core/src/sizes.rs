@@ -199,8 +199,8 @@ fn fits(
     Ok(needed)
 }
 
-/// Returns true if a coarser grid may succeed: one of too high a density counts as too large, and so does one that has
-/// no room among the machine's addresses.
+/// Returns true if a coarser grid may succeed: this one is too large for its memory or for the machine's addresses, or
+/// its density is too high.
 const fn is_too_large(error: Error) -> bool {
     matches!(
         error,

@@ -20,15 +20,17 @@ pub(crate) fn tell(scene: &Scene) {
 
 /// Writes a line to standard error. An error is ignored: a closed pipe there must not end the work.
 pub fn say(line: &str) {
-    // Words of a file may be in the line: none of them may move the cursor or change colours.
-    let plain = |letter: char| {
-        let is_odd = letter.is_control() && letter != '\n';
-        let odd = is_odd.then(|| letter.escape_default()).into_iter().flatten();
-        odd.chain((!is_odd).then_some(letter))
-    };
-    let line: String = line.chars().flat_map(plain).collect();
+    // The line may contain words of a file, which must not move the cursor or change colours.
+    let mut plain = String::with_capacity(line.len());
+    for letter in line.chars() {
+        if letter.is_control() && letter != '\n' {
+            plain.extend(letter.escape_default());
+        } else {
+            plain.push(letter);
+        }
+    }
     // Not `eprintln`, which panics if nothing can be written.
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{plain}");
 }
 
 /// Returns the words for triangles that a build leaves out; nothing if there are none.

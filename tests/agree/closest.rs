@@ -256,7 +256,7 @@ fn the_point_of_a_triangle_is_the_closest_one() {
             5 => triangle[2] = std::array::from_fn(|k| a[k] + 1e-4 * part * c[k]),
             // Corners of Fibonacci numbers: this triangle is 2^-48 as high as long.
             6 => triangle = fibonacci,
-            // 2^-42 as high as long: the place below the point is off by 2^-13 of the length, and seems to lie inside.
+            // This triangle is 2^-42 as high as long: in f64 the place below the point is off by 2^-13 of its length.
             7 if round < 30 => (triangle, point) = narrow,
             _ => {}
         }

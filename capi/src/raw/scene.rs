@@ -216,7 +216,7 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
-/// Returns true if something lies in a range of addresses that the scene of a caller's view reads, or that view.
+/// Returns true if a caller's view of a scene, or something that the scene reads, lies in a range of addresses.
 fn reads(scene: &Scene<'_>, addresses: Addresses) -> bool {
     let view = addresses_around::<hgrid_scene, _>(scene, offset_of!(SceneView, scene));
     view.overlaps(addresses) || reads_within(scene, addresses, MAX_NESTING)

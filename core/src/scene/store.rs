@@ -123,8 +123,8 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance; [`Error::TooDeep`]
     /// for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`], [`Error::Misaligned`],
-    /// [`Error::TooManyTriangles`] for more instances than a tree takes, and [`Error::InvalidConfig`] if the method is not
-    /// [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
+    /// [`Error::TooManyTriangles`] for more instances than a tree takes, and [`Error::InvalidConfig`] if the method is
+    /// not [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
     pub fn build(
         instances: &[Instance],
         objects: &'a [Object<'a>],

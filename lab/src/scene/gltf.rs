@@ -30,7 +30,7 @@ use crate::vector::round;
 type Matrix = [[f64; 4]; 3];
 
 /// The start of the message for a file that the crate refuses, mostly because it breaks a rule of the format.
-const INVALID: &str = "it is no glTF that hgrid reads";
+const INVALID: &str = "it is not valid glTF, or of a kind that hgrid does not read";
 
 /// Reads the bytes of a file, and the files that it names beside it.
 ///
@@ -141,7 +141,9 @@ fn buffers(document: &Document, mut blob: Option<Vec<u8>>, folder: &Path) -> Res
                         .context("its text is not base64")?
                 }
                 None if uri.contains(':') => {
-                    bail!("`{uri}` is an address: put the file beside this one, and name it here")
+                    bail!(
+                        "`{uri}` is an address: put that file beside this one, and name it in place of the address"
+                    )
                 }
                 None => {
                     let path =
@@ -473,7 +475,7 @@ mod tests {
         let text = as_text();
         for (from, to, expected) in [
             ("data:application", "mesh.bin?", "buffer 0: cannot read `no/such/mesh.bin"),
-            ("data:", "https:", "is an address: put the file beside this one"),
+            ("data:", "https:", "is an address: put that file beside this one"),
             (";base64,", ";base64,!", "buffer 0: its text is not base64"),
             (r#""byteLength": 54"#, r#""byteLength": 99"#, "buffer 0: it has 54 bytes of 99"),
             (
@@ -508,7 +510,11 @@ mod tests {
                 r#""extensionsRequired": ["KHR_draco_mesh_compression"], "asset""#,
                 "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
-            (r#""mesh": 0"#, r#""mesh": 8"#, "hgrid reads: nodes[0].mesh: Index out of bounds"),
+            (
+                r#""mesh": 0"#,
+                r#""mesh": 8"#,
+                "hgrid does not read: nodes[0].mesh: Index out of bounds",
+            ),
             (
                 r#""2.0""#,
                 r#""1.0""#,
@@ -517,7 +523,7 @@ mod tests {
             (r#""2.0""#, r#""2.0", "minVersion": "3.0""#, "it is of glTF 3.0"),
             (r#""2.0"}, "scene": 0"#, r#""1.0"}, "scene": "a""#, "it is of glTF 1.0"),
             (r#""POSITION": 0"#, r#""POSITION": 2"#, "a mesh names an accessor that is not there"),
-            ("{", "[", "it is no glTF that hgrid reads: "),
+            ("{", "[", "it is not valid glTF, or of a kind that hgrid does not read: "),
         ] {
             let message = format!("{:#}", read_text(&text.replacen(from, to, 1)).unwrap_err());
             assert!(message.contains(expected), "{message}");

@@ -191,7 +191,7 @@ impl Scene {
     }
 }
 
-/// What the words of a scene mean.
+/// The kinds of scenes that a user may name.
 enum Source<'s> {
     /// One scene inside another.
     Pair(&'s str, &'s str),

@@ -41,7 +41,7 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Model> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
     let is_old = matches!(source.fill_buf()?, [_, _, _, b'\r', next, ..] if *next != b'\n');
-    ensure!(!is_old, "its lines end in CR alone: save it with LF or CR LF");
+    ensure!(!is_old, "its lines end in CR alone: save the file with LF or CR LF");
     let mut reader = Reader::new(source);
     // After its first line, the parser's error describes its own state.
     let header = match Parser::<Skipped>::new().read_header(&mut reader) {
@@ -468,7 +468,10 @@ mod tests {
     fn damage_is_reported() {
         assert!(message(b"hello\n").contains("not a PLY file"));
         assert!(message(b"").contains("not a PLY file"));
-        assert_eq!(message(b"ply\rformat"), "its lines end in CR alone: save it with LF or CR LF");
+        assert_eq!(
+            message(b"ply\rformat"),
+            "its lines end in CR alone: save the file with LF or CR LF"
+        );
         let text = String::from_utf8(ascii()).unwrap();
         let broken = [
             (
