@@ -236,13 +236,18 @@ fn reads_within(scene: &Scene<'_>, addresses: Addresses, most: usize) -> bool {
 /// Refuses to write the view of a scene over the view of an object that the scene shows.
 fn check_view(to: NonNull<hgrid_scene>, objects: &[Object<'_>]) -> Result<(), hgrid_status> {
     let to = Addresses::new(to.as_ptr().cast(), size_of::<hgrid_scene>());
-    let is_over = |object: &Object<'_>| match object {
-        Object::Grid(grid) => addresses_of_view(*grid).overlaps(to),
-        Object::Scene(scene) => addresses_of_view(*scene).overlaps(to),
-        Object::Shapes(_, test) => addresses_of_view(*test).overlaps(to),
-        Object::Nothing => false,
-    };
+    let is_over = |object| view_of(object).overlaps(to);
     if objects.iter().any(is_over) { Err(HGRID_ERROR_OVERLAP) } else { Ok(()) }
+}
+
+/// Returns the addresses of what an object keeps of the caller's view; none for an object of zeros.
+fn view_of(object: &Object<'_>) -> Addresses {
+    match object {
+        Object::Grid(grid) => addresses_of_view(*grid),
+        Object::Scene(scene) => addresses_of_view(*scene),
+        Object::Shapes(_, test) => addresses_of_view(*test),
+        Object::Nothing => addresses_of(&[]),
+    }
 }
 
 /// Returns true if a view of a scene, its blob or its array of objects lies in a range of addresses.
@@ -254,18 +259,15 @@ fn holds(scene: &Scene<'_>, addresses: Addresses) -> bool {
 
 /// Returns true if something of an object lies in a range of addresses, but for what a scene shows.
 fn touches(object: &Object<'_>, addresses: Addresses) -> bool {
-    match object {
+    let reads = match object {
         Object::Grid(grid) => {
-            addresses_of_view(*grid).overlaps(addresses)
-                || addresses_of(grid.blob()).overlaps(addresses)
-                || shares(grid.mesh(), addresses)
+            addresses_of(grid.blob()).overlaps(addresses) || shares(grid.mesh(), addresses)
         }
         Object::Scene(inner) => holds(inner, addresses),
-        Object::Shapes(shapes, test) => {
-            addresses_of_view(*test).overlaps(addresses) || shapes_read(shapes, addresses)
-        }
+        Object::Shapes(shapes, _) => shapes_read(shapes, addresses),
         Object::Nothing => false,
-    }
+    };
+    reads || view_of(object).overlaps(addresses)
 }
 
 /// Regions to write for a scene, once it is sure that its instances, the array of its objects and these themselves
