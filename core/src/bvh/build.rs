@@ -472,8 +472,8 @@ impl BuildInputs<'_> {
         debug_assert!(end == entries, "the units end before the entries");
     }
 
-    /// Builds the tree over the roots, behind their nodes, or in `spare` if the index has no room;
-    /// returns what there is then, or `None` if nothing has room.
+    /// Builds the tree over the roots, behind their nodes, or in `spare` if the index has no room; returns the contents
+    /// of the index, or `None` if neither has room.
     fn top<'e>(
         &self,
         entries: &'e mut [Entry],

@@ -69,6 +69,7 @@ impl Kernel for NewKeys<'_> {
         debug_assert!(xs.len() >= entries.len() && ys.len() >= entries.len(), "no centres");
         let stored = xs.chunks(LANES).zip(ys.chunks(LANES));
         for (entries, (xs, ys)) in entries.chunks_mut(LANES).zip(stored) {
+            // Replace the stored z of each entry by its new key.
             match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {
                 (Some(&[a, b, c, d, e, f, g, h]), Some(xs), Some(ys)) if HAS_VECTORS => {
                     let zs = [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]];
@@ -80,6 +81,7 @@ impl Kernel for NewKeys<'_> {
                 }
                 _ => one_by_one(entries, [xs, ys], rule),
             }
+            // Count the bin of each key.
             for entry in entries {
                 let count = counts.get_mut((entry[0] >> shift) as usize);
                 if let Some(count) = count.or_bug("a key behind those of all bins") {

@@ -76,7 +76,7 @@ const _: () = assert!(size_of::<Bin>() == 64 && offset_of!(Bin, bounds) % 16 == 
 #[derive(FromZeros)]
 pub(crate) struct Bins([[Bin; MOST_BINS]; 3]);
 
-/// The box of an item without the rest, which may be denormal numbers, and those are slow.
+/// The box of an item. Clears id and cost: as floats they may be denormal, and those are slow.
 #[inline(always)]
 fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
     let word = u32::MAX;
@@ -86,7 +86,7 @@ fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
 
 /// Twice the centre of a box, and minus that.
 #[inline(always)]
-fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
+fn twice_center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     let (low, high) = sides.split();
     sides - high.combine(low)
 }
@@ -98,12 +98,12 @@ fn box_of_centers<S: Simd>(simd: S, items: &[Item]) -> f32x8<S> {
     // Unite four centres first: a minimum with the box waits for the one before it.
     let (fours, rest) = if HAS_VECTORS { items.as_chunks::<4>() } else { (&[][..], items) };
     for [a, b, c, d] in fours {
-        let [a, b] = [center(load(simd, a)), center(load(simd, b))];
-        let [c, d] = [center(load(simd, c)), center(load(simd, d))];
+        let [a, b] = [twice_center(load(simd, a)), twice_center(load(simd, b))];
+        let [c, d] = [twice_center(load(simd, c)), twice_center(load(simd, d))];
         centers = centers.lesser(a.lesser(b).lesser(c.lesser(d)));
     }
     for item in rest {
-        centers = centers.lesser(center(load(simd, item)));
+        centers = centers.lesser(twice_center(load(simd, item)));
     }
     centers
 }
@@ -275,14 +275,17 @@ impl Kernel for CutInTwo<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self { items, most_bins, unit, bins } = self;
+        // Bin the items by their centres.
         let count = bin_count(items.len()).min(most_bins);
         let rule = BinScale::new(simd, count, box_of_centers(simd, items));
         bins.fill(simd, items, &rule);
+        // Find the cheapest cut, and the boxes of its parts.
         let split = bins.best(simd, &rule, unit)?;
         let bins = bins.0[split.axis()].get(..rule.count).unwrap_or_default();
         let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
         let (first, second) = parts.unwrap_or_default();
         let boxes = [union(simd, first), union(simd, second)];
+        // Move the items.
         let middle = partition(simd, items, &rule, &split);
         debug_assert!(middle > 0 && middle < items.len(), "a part without items");
         Some((middle, boxes))
@@ -291,10 +294,11 @@ impl Kernel for CutInTwo<'_> {
 
 /// Brings the items before a cut to the front; returns how many there are.
 ///
-/// Each item moves to the place behind the first part. The item that was there moves into the gap that the item before
-/// left. Then the first part grows if it has the item (Lomuto's partition as one cycle). No branch depends on the part
-/// to which an item belongs, as that is unpredictable. A choice between two items would become a masked store where the
-/// compiler may use AVX-512, and the next loads would wait for it.
+/// This is Lomuto's partition as one cycle of moves. The first item is set aside and leaves a gap. Each step moves the
+/// item behind the first part into the gap, and puts the item behind the gap in its place, which leaves the next gap.
+/// The first part grows if that item belongs to it. No branch depends on the part of an item, as that is unpredictable.
+/// A choice between two items would become a masked store where the compiler may use AVX-512, and the next loads would
+/// wait for it.
 #[inline(always)]
 fn partition<S: Simd>(simd: S, items: &mut [Item], rule: &BinScale, split: &Split) -> usize {
     let Some(&start) = items.first() else { return 0 };

@@ -62,7 +62,7 @@ pub(crate) struct FineSides {
 
 const _: () = assert!(size_of::<FineSides>() == 196 && align_of::<FineSides>() == 4);
 
-/// The exact box of a child: least x, y, z, then greatest with other signs.
+/// The exact box of a child: least x, y, z, then the negated greatest.
 pub(crate) type ExactBox = [f32; 6];
 
 /// The fine sides of a tree while it is built.
@@ -122,8 +122,8 @@ impl FineSides {
         Self { sides: [least, least, least, greatest, greatest, greatest], node: u32::MAX }
     };
 
-    /// Returns true if they are those of the node with a number, all are numbers, and the boxes of children that are
-    /// not there are inside out.
+    /// Returns true if they name the node by its number, the node has no leaves, all sides are finite, and the boxes of
+    /// children that are not there are inside out.
     pub(crate) fn are_of(&self, number: u32, node: &Node) -> bool {
         let is_inside_out = |slot: usize| {
             let none = Self::NONE.sides.map(|side| side[slot].to_bits());
@@ -147,7 +147,7 @@ impl FineSides {
     pub(crate) fn set(&mut self, node: &Node, slot: usize, exact: &ExactBox) {
         let margins = node.steps().map(|step| step * MARGIN);
         for (side, row) in self.sides.iter_mut().enumerate() {
-            // Both kinds of sides move down, as the signs of the greatest are changed.
+            // Move all sides down: the greatest are negated.
             let moved = (exact[side] - margins[side % 3]).next_down();
             row[slot % WIDTH] = if side < 3 { moved } else { -moved };
         }
@@ -161,7 +161,7 @@ impl FineSides {
 }
 
 impl Node {
-    /// Which fine sides are those of the node; a number that no list reaches if it has none.
+    /// The place of the node's fine sides in the list, or one behind the end of any list if it has none.
     #[inline(always)]
     pub(crate) const fn fine_place(&self) -> usize {
         // Without the bit, the number is 2^31 or more.

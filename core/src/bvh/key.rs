@@ -51,8 +51,8 @@ impl Keys {
 
     inline_unless_small! {
         /// The key of a box, given min + max.
-        pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
-            let cell = (center - self.origin) * self.scale;
+        pub(crate) fn of_twice(&self, twice: Vec3A) -> u32 {
+            let cell = (twice - self.origin) * self.scale;
             let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
             let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
                 .to_array()

@@ -24,8 +24,8 @@
 //! several tasks, for the centres of crowded bins that have no room in the index (8 bytes a triangle without an index),
 //! and for keys and the tree on top where the index has no room for them.
 //!
-//! So constants bound index and scratch, those of a build with one task (`HGRID_INDEX_BOUND`, 16 n + 640, and
-//! `HGRID_SCRATCH_BOUND`, 17 n + 320, in C; a test compares them for many `n`):
+//! So two linear functions bound the index and the scratch of a build with one task (in C `HGRID_INDEX_BOUND`,
+//! 16 n + 640, and `HGRID_SCRATCH_BOUND`, 17 n + 320; a test compares them for many `n`):
 //!
 //! ```text
 //! late roots <= 5 n / 4097 + 1                      behind crowded bins, see above

@@ -94,8 +94,8 @@ impl Cutter {
         Self { limits, level: SimdLevel::detect(), unit, bins: Bins::new() }
     }
 
-    /// Cuts a range into eight parts, or into small ones if there are fewer. Moves the items, so that each part is a
-    /// range. The parts become the children of a node with `level` levels above.
+    /// Cuts a range into eight parts, or into fewer if all are small. Moves the items, so that each part is a range.
+    /// The parts become the children of a node with `level` levels above.
     pub(crate) fn parts(&mut self, items: &mut [Item], range: &Range<u32>, level: u32) -> Parts {
         let halve = level >= self.limits.halved_from;
         let mut parts = Parts::one(range);

@@ -150,7 +150,7 @@ impl Roots<'_> {
         }
     }
 
-    /// Returns the length of the first part of a range cut in two, neither part smaller than a piece.
+    /// Returns the length of the first part of a range cut in two; neither part has fewer than [`LEAST_PIECE`] entries.
     fn split(&self, range: Range<usize>) -> usize {
         let entries = self.entries.get(range).unwrap_or_default();
         debug_assert!(entries.len() > MOST_ROOT, "too few entries to cut");
@@ -172,6 +172,7 @@ impl Roots<'_> {
         let child = self.child + self.node_count;
         debug_assert!(range.end <= self.entries.len(), "a root behind the entries");
         let Some(entries) = self.entries.get(range.clone()) else { return };
+        // Make the subtree, and copy its ids and nodes to the index.
         let subtree = &mut *self.subtree;
         let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
         dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
@@ -181,6 +182,7 @@ impl Roots<'_> {
         let below = self.subtree.below();
         copy_what_fits(below, self.nodes.get_mut(self.node_count as usize..));
         self.node_count += below.len() as u32;
+        // Write the record over entries that are used up.
         let (node, &[x, y, z, _, u, v, w, _]) = self.subtree.root();
         let (min, max) = ([x, y, z], [-u, -v, -w]);
         let levels = self.subtree.levels();

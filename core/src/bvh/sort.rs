@@ -90,10 +90,12 @@ impl Kernel for Sums<'_> {
         let none = u16x8::splat(simd, 0);
         let mut end = none;
         for eight in heads.as_chunks_mut::<8>().0.iter_mut().take(digits.div_ceil(8)) {
+            // Sum up within the vector: add the sums one, two and four lanes below.
             let counts = u16x8::simd_from(simd, *eight);
             let mut sums = counts + simd.slide_u16x8::<7>(none, counts);
             sums += simd.slide_u16x8::<6>(none, sums);
             sums += simd.slide_u16x8::<4>(none, sums);
+            // Write the places, and move the end on.
             *eight = (end + (sums - counts)).into();
             end += u16x8::splat(simd, sums[7]);
         }

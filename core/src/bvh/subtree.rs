@@ -12,14 +12,14 @@
 //! ```
 //!
 //! A part is small if it has four triangles or fewer. A query reads four at once, so two leaves of two take twice as
-//! long as one of four. Two bits also cut small parts, which may be wide there: the highest that changes in the range,
-//! and the next that changes anywhere in the subtree.
+//! long as one of four. Two bits cut small parts, too, because triangles that differ in them may lie far apart: the
+//! highest that changes in the range, and the next lower one that changes anywhere in the subtree.
 //!
-//! `m` triangles have one node, or (m - 1) / 7 at most. Let `a` nodes have nodes among their children, and `b` have
-//! none. Each of the `a` has eight children. Of these 8 a children, a + b - 1 are nodes (all but the root); the others
-//! are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the only node. So m >=
-//! 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes for the memory bound is cut
-//! again, by halves only.
+//! A subtree over `m` triangles has one node, or (m - 1) / 7 at most. Let `a` nodes have nodes among their children,
+//! and `b` have none. Each of the `a` has eight children. Of these 8 a children, a + b - 1 are nodes (all but the
+//! root); the others are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the
+//! only node. So m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes for the
+//! memory bound is cut again, by halves only.
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
@@ -58,7 +58,7 @@ pub(crate) struct Subtree {
     ranges: [EntryRange; MOST_NODES],
     /// Levels above each node.
     above: [u8; MOST_NODES],
-    /// No number in `changes` inside each range is higher than this.
+    /// The highest number that `changes` may have inside each range.
     tops: [u8; MOST_NODES],
     count: usize,
     /// The boxes of the triangles, then those of the nodes.
@@ -373,9 +373,8 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     [x, y, z, 0.0, u, v, w, 0.0]
 }
 
-/// Cuts a range into eight parts, or into small ones if there are fewer, in the order of the keys: where keys change in
-/// the highest bits; then the largest part is halved until there are eight, or all are small. Also returns what
-/// [`highest`] does.
+/// Cuts a range, in the order of the keys, into eight parts, or into fewer if all are small: where keys change in the
+/// highest bits; then it halves the largest part. Also returns the lowest bit that [`highest`] looked at.
 #[inline(always)]
 fn parts(range: EntryRange, bits: u32, places: &[u128; 32]) -> ([EntryRange; WIDTH], u8) {
     let mut parts = [EntryRange::NONE; WIDTH];

@@ -62,6 +62,7 @@ pub(crate) fn build(
             Some(_) => break,
         };
         let Some([start, end, level]) = node.waiter() else { continue };
+        // Cut the range of a node that waits, and make a child of each part.
         let parts = cutter.parts(items, &(start..end), level);
         let mut node = Node { child: child + count, ..Node::EMPTY };
         for (slot, part) in parts.ranges().enumerate() {
@@ -77,6 +78,7 @@ pub(crate) fn build(
             *nodes.get_mut(count as usize)? = below;
             count += 1;
         }
+        // Quantise the boxes, and write the node.
         node.set_boxes(&parts.bounds(), &parts.boxes, least_node(bounds));
         #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
         let number = at.map_or(0, |at| child + at as u32);
