@@ -81,7 +81,7 @@ impl<C: Together> Groups<'_, C> {
             if batch.keeps_order()
                 && let Some(order) = &order
             {
-                take_turns(batch, mesh, choice.cull, order, first);
+                finish_deferred(batch, mesh, choice.cull, order, first);
             }
             first += of_window;
         }
@@ -90,7 +90,7 @@ impl<C: Together> Groups<'_, C> {
 
 /// Finishes the rays of a sorted window that wait for the filter, in the caller's order.
 #[inline(never)]
-fn take_turns(
+fn finish_deferred(
     batch: &mut impl Together,
     mesh: &TriangleMesh<'_>,
     cull: Cull,

@@ -181,6 +181,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
+                    // Decode the boxes of the node, and intersect the rays with them.
                     let boxes = WideBoxes::decode(simd, bvh, node, rays.center, rays.growth);
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
@@ -201,6 +202,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
                     }
                 }
                 Child::Leaf { first, count } => {
+                    // Test the triangles of the leaf, or offer its boxes.
                     let leaf = Leaf { bvh, mesh, bounds, first, ids: bvh.leaf(first, count) };
                     leaves.enter(simd, &leaf, rays, &beam, mask);
                 }

@@ -154,6 +154,7 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
     while rest != 0 {
         let ray = rest.trailing_zeros();
         rest &= rest - 1;
+        // Drop the triangles beside the ray, and those that it meets before its start.
         let filter = rays.filter(simd, ray);
         let mut dropped = filter.drops(&triangles.corners, &size);
         if rays.may_leave {
@@ -161,6 +162,7 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
             dropped |= filter.passes_before(simd, &triangles.corners, &size, start);
         }
         let mut survivors = !bits(dropped) & triangles.used;
+        // End the ray if a triangle surely blocks it.
         if ANY && survivors != 0 && rays.may_block {
             let range = rays.range_of(simd, ray);
             let hits = filter.surely_hits(simd, &triangles.corners, &size, range);
@@ -172,6 +174,7 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
                 continue;
             }
         }
+        // Note the pairs that are left.
         while survivors != 0 {
             let lane = survivors.trailing_zeros();
             survivors &= survivors - 1;

@@ -126,9 +126,9 @@ type Vectors<S> = [f32x8<S>; 3];
 
 /// Lower bounds of the squared distances from the point to eight triangles.
 ///
-/// For any direction, the plane across it through the triangle's nearest corner has the whole triangle behind it, so
-/// its distance is a lower bound. Two directions are tried: to the nearest point of an edge, and the normal. One of
-/// them leads to the closest point, so the bound is tight up to rounding; a wrong direction only makes it smaller.
+/// Take the plane that is perpendicular to a direction and goes through the triangle's nearest corner along it. The
+/// whole triangle lies behind this plane, so its distance is a lower bound. Two directions are tried: to the nearest
+/// point of an edge, and the normal. One of them leads to the closest point, so the bound is tight up to rounding.
 #[inline(always)]
 fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x8<S> {
     let (scale, at) = (f32x8::splat(simd, point.scale), splat(simd, point.at));
@@ -176,9 +176,9 @@ fn nearer<S: Simd>(one: Vectors<S>, other: Vectors<S>) -> Vectors<S> {
     ]
 }
 
-/// Lower bounds of the squared distances from zero to triangles. A plane across the direction goes through the nearest
-/// corner of each, so that the triangle lies behind it; the bound is the squared distance of that plane. `far` is
-/// [`DOTS`] times the largest sum of magnitudes of a corner.
+/// Lower bounds of the squared distances from zero to triangles: those of the planes that are perpendicular to the
+/// direction and go through the nearest corner of each. `far` is [`DOTS`] times the largest sum of magnitudes of a
+/// corner.
 #[inline(always)]
 fn across<S: Simd>(
     simd: S,
@@ -228,6 +228,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                 Child::Inner(number) => {
                     tally.grid_step();
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
+                    // Bound the distances to the boxes of the node.
                     let away = boxes(simd, bvh, node, &point);
                     let beyond = away.simd_gt(f32x8::splat(simd, reach));
                     let mut rest = !bits(beyond) & node.used();
@@ -256,6 +257,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     let ids = bvh.leaf(first, count);
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
+                    // Test the triangles of a small leaf; of a larger one, bound the distances first.
                     if ids.len() <= unbounded {
                         for &id in ids {
                             reach = point.reach(test(id));

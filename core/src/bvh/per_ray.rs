@@ -1,4 +1,4 @@
-//! A number of each ray of a group.
+//! Rows: one number for each ray of a group, in vectors of eight or sixteen rays.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16};
@@ -11,7 +11,7 @@ pub(crate) const GROUP: usize = 64;
 /// Vectors of eight rays.
 pub(super) const OCTETS: usize = GROUP / 8;
 
-/// A number of each ray.
+/// A row: one number for each ray.
 pub(super) type PerRay = [[f32; 8]; OCTETS];
 
 /// The least and the greatest number of a row.

@@ -72,7 +72,7 @@ impl Bvh<'_> {
     /// Checks that all ids name triangles of the mesh, and finite ones.
     fn check_ids(&self, header: &Header, mesh: &TriangleMesh<'_>) -> Result<(), Error> {
         let triangles = mesh.triangle_count();
-        // Most ids are right, which the largest one tells sooner than each.
+        // Test the largest id first: that takes less time than to test each, and mostly all are right.
         if self.ids.iter().fold(0, |largest, &id| largest.max(id)) >= triangles
             && let Some(word) = self.ids.iter().position(|&id| id >= triangles)
         {
@@ -108,6 +108,7 @@ impl Kernel for CheckNodes<'_> {
         let mut cost = Cost::default();
         let mut next = Some(0_u32);
         loop {
+            // Check a node, and note its child nodes.
             if let Some(number) = next.take() {
                 let node = bvh.nodes.get(number as usize).ok_or(bvh.wrong_node(number))?;
                 unmet = unmet.checked_sub(1).ok_or(bvh.wrong_node(number))?;
@@ -122,6 +123,7 @@ impl Kernel for CheckNodes<'_> {
                 }
                 cost.add(simd, node, number == 0);
             }
+            // Go down to the next child node, or up if there is none left.
             let above = depth.checked_sub(1).and_then(|above| path.get_mut(above));
             let Some((number, rest)) = above else { break };
             if *rest == 0 {
@@ -311,7 +313,7 @@ fn read<'m, S: Simd>(
 /// Checks that every triangle names vertices of the mesh, and that at least as many triangles are non-finite as the
 /// build left out.
 fn check_mesh(header: &Header, mesh: &TriangleMesh<'_>) -> Result<(), Error> {
-    // Most meshes are finite, which vertices tell sooner than triangles.
+    // Most meshes are finite: a pass over the vertices shows that sooner than one over the triangles.
     if header.skipped_count == 0 && mesh.is_finite() {
         return match mesh.first_without_vertices() {
             Some(triangle) => Err(Error::IndexOutOfRange { triangle }),

@@ -25,7 +25,7 @@ pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 /// half its node and slot.
 pub(crate) type StackEntry = u64;
 
-/// Out of line, as the next function is: otherwise each would have the stack of both.
+/// Lends a small stack. Out of line, as the next function is: inlined, both arrays would take stack in one frame.
 #[inline(never)]
 pub(super) fn with_small_stack<R>(walk: impl FnOnce(&mut [StackEntry]) -> R) -> R {
     walk(&mut [0; SMALL_STACK])

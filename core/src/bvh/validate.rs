@@ -88,6 +88,7 @@ impl Bvh<'_> {
             let number = level.node;
             let wrong = self.wrong_node(number);
             let node = self.nodes.get(number as usize).ok_or(wrong)?;
+            // Check the node when the walk comes from above.
             if level.rest == 0xff {
                 if !budget.take(1) {
                     return Err(wrong);
@@ -106,6 +107,7 @@ impl Bvh<'_> {
                 depth = above;
                 continue;
             }
+            // Intersect the box that the next child may fill with those above.
             let slot = level.rest.trailing_zeros();
             level.rest &= level.rest - 1;
             let (min, max) = node.holds(slot as usize);
@@ -114,6 +116,7 @@ impl Bvh<'_> {
                 let holds = fine.holds(node, slot as usize);
                 (min, max) = (min.max(holds.0), max.min(holds.1));
             }
+            // Go down into a node; check the triangles of a leaf.
             match node.child(slot) {
                 Child::Inner(child) => {
                     if child as usize >= self.nodes.len() {

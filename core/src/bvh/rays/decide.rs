@@ -201,8 +201,8 @@ impl Rays {
         }
     }
 
-    /// Drops hits whose `t` is larger than that in `until` for their ray; call it before any are found. The range of a
-    /// ray stays as it is and decides what is a hit. Places without a ray may hold anything.
+    /// Ends each ray behind its `t` in `until`: farther hits do not matter. Call it before any hit is found. The range
+    /// of a ray stays as it is and decides what is a hit. Places without a ray may hold anything.
     #[inline(always)]
     pub(crate) fn take_until<S: Simd>(&mut self, simd: S, until: &[f32; GROUP]) {
         let octets: &PerRay = transmute_ref!(until);

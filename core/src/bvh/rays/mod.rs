@@ -186,7 +186,7 @@ impl Rays {
         }
         self.rate = rate(sum.reduce_max());
         self.alive = alive;
-        self.settle(simd);
+        self.recenter(simd);
         let [x, y, z] = self.origins;
         let center = Vec3A::from(self.center);
         let (low, high) = (Vec3A::new(x[0], y[0], z[0]), Vec3A::new(x[1], y[1], z[1]));
@@ -209,7 +209,7 @@ impl Rays {
     /// Measures origins from that of the first ray. A ray that is not alive gets the numbers of the first, so that it
     /// widens no interval.
     #[inline(always)]
-    fn settle<S: Simd>(&mut self, simd: S) {
+    fn recenter<S: Simd>(&mut self, simd: S) {
         let first = self.alive.trailing_zeros();
         self.center = self.given[first as usize % GROUP].origin;
         let mut farthest = 0.0;
@@ -240,16 +240,19 @@ impl Rays {
     /// All rays as one beam, before any of them is done.
     #[inline(always)]
     pub(crate) fn beam<S: Simd>(&self, simd: S) -> Beam<S> {
+        // Find the intervals of the inverse directions, and the axes on which all have one sign.
         let [a, b, c] = self.origins;
         let [d, e, f] = &self.inverse;
         let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
         let [x, y, z] = inverses;
         let is_positive = inverses.map(|[low, _]| low > 0.0);
         let is_bounded = inverses.map(|[low, high]| low > 0.0 || high < 0.0);
+        // Order the origins: a ray from the first reaches a side earlier.
         let order = |[low, high]: [f32; 2], axis: usize| {
             if is_positive[axis] { [high, low] } else { [low, high] }
         };
         let (a, b, c) = (order(a, 0), order(b, 1), order(c, 2));
+        // Find the first start and the last end.
         let first = f32x8::splat(simd, get(&self.start, self.alive.trailing_zeros()));
         let (mut start, mut end) = (first, first);
         for octet in 0..OCTETS {
@@ -260,6 +263,7 @@ impl Rays {
             end = end.greater(is_alive.select(to, first));
         }
         let end = end.reduce_max();
+        // Find the box around short rays, if directions have both signs on an axis.
         let mut swept = None;
         let is_tested = self.alive.count_ones() > FEW_RAYS;
         if is_tested && is_bounded != [true; 3] && end < self.extent {
