@@ -1,11 +1,11 @@
-//! Axis-aligned boxes, in scene units, and the part of a line inside one.
+//! Axis-aligned boxes, in scene units or in cells, and the part of a line inside one.
 
 use glam::Vec3A;
 
 use crate::limits::MAX_COORDINATE;
 use crate::simd::inline_unless_small;
 
-/// The smallest box around some points.
+/// An axis-aligned box: its least and its greatest corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Aabb {
     pub(crate) min: Vec3A,

@@ -71,7 +71,7 @@ impl Reach {
     }
 }
 
-/// Where a ray starts at a box, and how exactly.
+/// The start of a ray at a box, and its error.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Approach {
     /// The ray's origin, or a point of the ray at the box if that is far away.

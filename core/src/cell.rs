@@ -1,9 +1,9 @@
-//! From scene units to cells and back: how many cells, which ones a triangle overlaps.
+//! Cuts a box into cells: chooses how many, and finds those that a triangle overlaps.
 //!
 //! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A triangle
-//! is inserted into every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
-//! harmless everywhere else: the walk may be a few roundings off at a border, and the ray that the
-//! triangle test sees a few roundings off the walk's, and still the cell lists the triangle.
+//! is inserted into every cell that its own box, grown by a margin, overlaps. The margin absorbs all float errors:
+//! where the walk is a few roundings off at a border, or off the ray of the triangle test, the cell still lists the
+//! triangle.
 //!
 //! ```text
 //! error of             bound, in box extents E        why
@@ -164,7 +164,7 @@ impl Lattice {
         Aabb { min: self.min.into(), max: self.max.into() }
     }
 
-    /// The cells into which a triangle with this box belongs.
+    /// The cells to which a triangle with this box belongs.
     #[inline(always)]
     pub(crate) fn range(&self, triangle: &Aabb) -> CellRange {
         cells_between(self.reach(triangle), self.resolution)

@@ -94,9 +94,9 @@ impl Sum {
         self.add(negated, x[2], y[1], z[0]);
     }
 
-    /// Adds a multiple of the normal's product with a vector.
+    /// Adds a multiple of S(x): the product of the triangle's normal and a vector.
     #[inline(never)]
-    fn add_across(&mut self, scale: Number, [a, b, c]: [Vector; 3], x: Vector) {
+    fn add_normal_product(&mut self, scale: Number, [a, b, c]: [Vector; 3], x: Vector) {
         self.add_determinant(scale, b, c, x);
         self.add_determinant(scale, c, a, x);
         self.add_determinant(scale, a, b, x);
@@ -111,7 +111,7 @@ impl Sum {
             rest |= limb & 0xffff_ffff;
             carry = limb >> 32;
         }
-        // All limbs but the carry out of the last one are positive.
+        // Carried, no limb is negative, so the carry out of the last one has the sign.
         if carry < 0 { Ordering::Less } else { (carry | rest).cmp(&0) }
     }
 }
@@ -129,11 +129,11 @@ pub(crate) fn compare(
     let corners @ [a, b, c] = [vector(triangle[0]), vector(triangle[1]), vector(triangle[2])];
     let (origin, direction) = (vector(origin), vector(direction));
     let mut along = Sum([0; LIMBS]);
-    along.add_across(Number::ONE, corners, direction);
+    along.add_normal_product(Number::ONE, corners, direction);
     let mut ahead = Sum([0; LIMBS]);
     ahead.add_determinant(Number::ONE, a, b, c);
-    ahead.add_across(Number::ONE.negated(), corners, origin);
-    ahead.add_across(Number::new(t).negated(), corners, direction);
+    ahead.add_normal_product(Number::ONE.negated(), corners, origin);
+    ahead.add_normal_product(Number::new(t).negated(), corners, direction);
     match along.sign() {
         Ordering::Less => Some(ahead.sign().reverse()),
         Ordering::Equal => None,

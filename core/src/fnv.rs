@@ -12,7 +12,7 @@ impl Fnv {
         self.0 = (self.0 ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
     }
 
-    /// The hash, mixed so that every bit of the last words counts everywhere.
+    /// The hash, its high bits mixed into the low ones: a product carries bits only upwards.
     pub(crate) const fn finish(self) -> u64 {
         self.0 ^ (self.0 >> 29)
     }

@@ -27,7 +27,7 @@ pub(crate) trait Lanes:
     fn or_greater(self, other: Self) -> Self;
 
     /// Returns true if one of three numbers is below `-error` and one above `error`. `edges[2]` is NaN if one of the
-    /// others is, and then it is false.
+    /// others is, and then the answer is false.
     fn are_opposite(edges: [Self; 3], error: Self) -> Self::Mask;
 }
 

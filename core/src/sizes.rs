@@ -143,7 +143,7 @@ pub fn fit(
     // A tree has no density.
     let most_steps = if config.parameters.density().is_some() { MOST_STEPS } else { 0 };
     let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
-    // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
+    // Double the number of steps until the grid fits, then bisect for the smallest.
     let (mut low, mut high) = (0, 0);
     let mut needed = loop {
         match try_with(high) {

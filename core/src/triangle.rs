@@ -363,7 +363,7 @@ impl TriangleTest {
 
         // Multiply the normal by the direction and by the vector from the point at `t` to a corner; bound the errors
         // by the sums of the terms' magnitudes.
-        let (left, right) = (turned(e, f), turned(f, e));
+        let (left, right) = (cross_terms(e, f), cross_terms(f, e));
         let (normal, size) = (minus(left, right), magnitudes(left, right));
         let slope = dot(normal, direction);
         let height = dot(normal, minus(start, along));
@@ -392,7 +392,7 @@ fn magnitudes(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// The terms of a cross product that are added; with the vectors exchanged, those subtracted.
-fn turned(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+fn cross_terms(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2], a[2] * b[0], a[0] * b[1]]
 }
 

@@ -214,12 +214,14 @@ impl<'a> OneLevel<'a> {
         let moves = line.moves([1, width, width * height]);
         loop {
             tally.cell_step();
+            // Show the list of the cell, if it has one.
             if is_set(self.sections.domain_bits, bit)
                 && let Some(ends) = self.ends_of_marked(walk.cell())
                 && let Some(references) = self.between(ends)
             {
                 limit = leaf(references, tally);
             }
+            // Step to the next cell, and to its bit.
             if walk.advance_far(limit, |axis| bit = bit.wrapping_add(moves[axis])) != Step::Inside {
                 return;
             }

@@ -1,8 +1,8 @@
-//! Finds the cells of a batch of primitives before it enters the first of them into their lists.
+//! A batch of 64 primitives, and the cells of each.
 //!
 //! The number of cells of a primitive is unpredictable, so a branch on it is often mispredicted, and the processor
-//! discards its work on the next primitives. A pass therefore finds the cells of a whole batch first, and branches on
-//! numbers in the L1 cache afterwards.
+//! discards its work on the next primitives. A pass therefore finds the cells of a whole batch first. Then it enters
+//! the primitives into lists, and branches on numbers in the L1 cache.
 
 use core::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
 
-/// Primitives with the cells that each belongs into. The lists hold the places of primitives.
+/// Primitives, numbered by their places, and the cells to which each belongs. Lists hold places.
 ///
 /// The passes take a trait object, so that their code is compiled once for all that is spread. They call `place` once
 /// a batch, and `range` only for primitives that it did not place.
@@ -26,8 +26,8 @@ pub(crate) trait Spread {
     /// The cells of the primitive at a place, if it has any. Every call answers the same.
     fn range(&self, place: u32) -> Option<CellRange>;
 
-    /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
-    /// the cells that [`range`](Self::range) says.
+    /// Notes in a batch the cells of the primitives at some places, no more than the batch holds: those that
+    /// [`range`](Self::range) finds. It may leave out primitives, whose bits in `is_placed` stay 0.
     fn place(&self, places: Range<u32>, batch: &mut PlacedBatch);
 }
 

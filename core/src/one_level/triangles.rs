@@ -86,9 +86,11 @@ impl Kernel for PlaceBatch<'_, '_> {
         batch.is_placed = 0;
         let slots = batch.rows.iter_mut().zip(&mut batch.xs).zip(&mut batch.more);
         for (at, ((rows, xs), more)) in (0_u32..).step_by(LANES).zip(slots) {
+            // Read eight triangles, and turn the ends of their boxes into cells.
             let ([x, y, z], is_finite) = spans.of(simd, &wide, first.wrapping_add(at));
             let (long, high, deep) = (x.last - x.first, y.last - y.first, z.last - z.first);
             let is_placed = (long | high | deep).simd_le(u32x8::splat(simd, MOST_MORE)) & is_finite;
+            // Note the row and x of the first cell, and how many more there are on each axis.
             *rows = (y.first + z.first * height).into();
             *xs = x.first.into();
             *more = (long | (high << MORE_BITS) | (deep << (2 * MORE_BITS))).into();

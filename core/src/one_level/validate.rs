@@ -143,10 +143,10 @@ pub(crate) fn is_list_of(
 }
 
 /// Returns true if a table is as displaced rows leave it: a row without marked cells has offset 0, every
-/// marked cell has a slot of its own, and of the slots those are full.
+/// marked cell has a slot of its own, and exactly these slots are full.
 ///
-/// Finds accidents. Slot numbers can be chosen so that their scrambled sums agree, so a proof counts
-/// the lists that cells name, too.
+/// It detects accidents, not attacks: slot numbers can be chosen so that their scrambled sums agree. So a proof also
+/// counts the lists that cells name.
 pub(crate) fn slots_are_sound(
     [width, height, depth]: [u32; 3],
     offset: impl Fn(usize) -> Option<i32>,

@@ -63,7 +63,7 @@ struct PackedSizes {
     end: u64,
 }
 
-/// The address of the view that an object is of; the same for the same member.
+/// The address of an object's view, which identifies a member.
 fn key(object: &Object<'_>) -> Option<u64> {
     match object {
         Object::Grid(grid) => Some(core::ptr::from_ref(*grid).addr() as u64),

@@ -9,9 +9,10 @@
 //! cell becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on
 //! and counts: at the end it knows, exactly, what index it would have needed.
 //!
-//! Nested detail, fans and slabs would make grids look at cells without end: each triangle lies in many cells of each
-//! grid. So a build may look at [`LOOKS`] cells for each triangle. A grid gets a share of those that are left, as
-//! large as its share of the references. A cell whose grid would take more stays a list.
+//! Nested detail, fans and slabs would take a build without end: each triangle lies in many cells of each grid. So a
+//! build has a budget of *looks*, [`LOOKS`] for each triangle. A grid below the root takes one for each of its cells,
+//! and two for each cell in the box of each of its triangles, to count and to fill. It gets a share of the looks that
+//! are left, as large as its share of the references. A cell whose grid would take more stays a list.
 //!
 //! Resolution as in Manta: with n primitives at depth d of D, `m = (density n)^(1 / (2 D + 1 - 2 d))` (by default 8 n)
 //! and `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
@@ -69,7 +70,8 @@ pub(crate) const fn scratch_bytes(header: &Header) -> u64 {
 ///
 /// Grids on one level that share n references, at least 5 each, have at most
 /// `(3.5 * density + 44) n` words and hand down at most `29 n` references. A grid below the root has 8 words,
-/// its entries and at least 5 references; it paid for twice as many cells, at least.
+/// one more for each cell, and at least 5 references. It took a look for each cell and two for each reference, or more:
+/// no more than two words a look.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

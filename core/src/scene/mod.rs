@@ -88,7 +88,7 @@ impl Object<'_> {
         }
     }
 
-    /// Scenes inside one another.
+    /// The number of scenes inside one another, the outermost included; 0 for other objects.
     const fn levels(&self) -> usize {
         match self {
             Self::Scene(scene) => scene.levels,

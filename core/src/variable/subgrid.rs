@@ -74,7 +74,7 @@ impl Frame {
         }
     }
 
-    /// The box's extent, in parts of the cell.
+    /// The box's extent, in 256ths of the cell.
     fn parts(&self) -> Vec3A {
         let parts =
             core::array::from_fn(|k| f32::from(self.high[k]) + 1.0 - f32::from(self.low[k]));
