@@ -114,7 +114,7 @@ fn addresses(elements: &Elements) -> Addresses {
 /// Returns true if a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
-/// same everywhere: the answer lies between two rays, or all of them are hit. With fewer than two elements the stride
+/// same everywhere: each answer lies between two rays, or each overlaps one. With fewer than two elements the stride
 /// means nothing, and their addresses decide.
 fn overlap(
     (rays, ray_bytes): (&Elements, usize),
