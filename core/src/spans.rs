@@ -2,7 +2,7 @@
 //!
 //! The result has the same bits as [`Lattice::range`] of each triangle: gather the corners, unite them to a box,
 //! round its sides by an addition. A pass finds the cells of many triangles before it enters the first into
-//! lists; the head of one_level/placed.rs tells why.
+//! lists; the head of `one_level/placed.rs` tells why.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
