@@ -237,6 +237,25 @@ mod tests {
         assert!((first.ratio - 2.0 / 3.0).abs() < 1e-9, "{first:?}");
     }
 
+    /// The first builds that exceed the repetitions count for images as they do for builds.
+    #[test]
+    fn all_first_builds_count_for_images() {
+        let with = |name, builds: &[f64]| {
+            let mut system = system(name, &[1.0], &[(Workload::Primary, Mode::Single, &[1.0], 0)]);
+            system.first_build =
+                Build { seconds: median(builds), samples: builds.to_vec(), page_faults: None };
+            system
+        };
+        let systems = [
+            with(Method::default().name(), &[9.0, 1.0, 1.0]),
+            with("embree-low", &[3.0, 3.0, 3.0]),
+        ];
+        let ratios = Ratio::all(&systems);
+        let image = of(&ratios, "time to image / best peer: first");
+        let expected = [0.5, 0.5, 2.5].map(f64::to_bits);
+        assert_eq!([image.least, image.ratio, image.most].map(f64::to_bits), expected);
+    }
+
     #[test]
     fn the_default_method_meets_the_best_mode_of_each_peer() {
         let packet = Mode::Packet(Lanes::Eight, Hint::None);
