@@ -54,14 +54,18 @@ impl Machine {
         }
     }
 
-    /// Formats everything but the command and the commit, as one line.
+    /// Formats everything but the command and the commit, as one line. So many threads built; one traced.
     #[must_use]
-    pub fn summary(&self) -> String {
+    pub fn summary(&self, threads: u32) -> String {
+        let threads = match threads {
+            0 | 1 => "one thread".to_owned(),
+            threads => format!("builds on {threads} threads, rays on one"),
+        };
         let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
         let pages = self.large_pages.as_ref().map(|when| format!(", large pages: {when}"));
         let pages = pages.unwrap_or_default();
         let Self { system, rustc, date, .. } = self;
-        format!("{cpu} (one thread), {system}{pages}, rustc {rustc}, {date}")
+        format!("{cpu} ({threads}), {system}{pages}, rustc {rustc}, {date}")
     }
 }
 
@@ -130,11 +134,12 @@ mod tests {
         let machine = Machine::here();
         assert!(machine.rustc.starts_with("1.") && machine.date.starts_with("20"), "{machine:?}");
         assert_eq!(machine.date.len(), 10);
-        assert!(machine.summary().contains("one thread"));
+        assert!(machine.summary(1).contains("(one thread)"));
+        assert!(machine.summary(2).contains("(builds on 2 threads, rays on one)"));
         let machine = Machine { large_pages: Some("never".to_owned()), ..machine };
-        assert!(machine.summary().contains(", large pages: never, rustc"));
+        assert!(machine.summary(1).contains(", large pages: never, rustc"));
         let machine = Machine { large_pages: None, ..machine };
-        assert!(!machine.summary().contains("large pages"));
+        assert!(!machine.summary(1).contains("large pages"));
     }
 
     #[test]

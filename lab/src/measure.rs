@@ -20,9 +20,10 @@
 //! together, the others one by one. A separate pass counts the work, ray by ray.
 
 use alloc::borrow::Cow;
+use std::ffi::{OsStr, OsString};
 use std::time::Instant;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, ensure};
 use hgrid_core::{Config, Counters, Grid, Hit, Method, QueryOptions, Ray, TriangleMesh};
 use serde::{Deserialize, Serialize};
 
@@ -348,6 +349,16 @@ fn numbers(
         build_samples: builds.to_vec(),
         render_samples: renders.to_vec(),
     }
+}
+
+/// Measures scenes in turn. A scene that fails stops no other: returns their errors as one.
+pub(crate) fn in_turn(
+    scenes: &[OsString],
+    mut measure: impl FnMut(&OsStr) -> Result<()>,
+) -> Option<Error> {
+    let failed = scenes.iter().filter_map(|scene| measure(scene).err());
+    let join = |all: Error, next: Error| anyhow!("{all:#}; {next:#}");
+    failed.reduce(join)
 }
 
 /// Returns `a / b`, or 0 if `b` is 0.

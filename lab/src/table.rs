@@ -6,14 +6,14 @@
 use std::ffi::OsString;
 use std::io::{self, Write as _};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Error, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
 use hgrid_core::{Config, Counters, TriangleMesh};
 use serde::{Deserialize, Serialize};
 
 use crate::cli::{Race, TableArgs};
 use crate::machine::Machine;
-use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
+use crate::measure::{Measurement, SceneFacts, Subject, in_turn, measure, ratio, rows};
 use crate::notices::tell;
 use crate::progress::Progress;
 use crate::render::unseen;
@@ -26,7 +26,7 @@ use crate::threads::Threads;
 /// # Errors
 /// If a scene cannot be loaded or built, or the pictures of two methods differ.
 pub fn run(args: &TableArgs) -> Result<()> {
-    let results = Results::measure(&args.scenes, &args.race)?;
+    let (results, failed) = Results::measure(&args.scenes, &args.race)?;
     let mut out = io::stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
@@ -35,7 +35,7 @@ pub fn run(args: &TableArgs) -> Result<()> {
     } else {
         writeln!(out, "{}", results.text())?;
     }
-    Ok(())
+    failed.map_or(Ok(()), Err)
 }
 
 /// Every number of a race over some scenes, with the machine and the settings.
@@ -64,17 +64,19 @@ pub struct SceneResults {
 }
 
 impl Results {
-    /// Runs the race on each scene in turn.
+    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the error of the
+    /// others, if there are any.
     ///
     /// # Errors
-    /// The errors of [`run`].
-    pub fn measure(scenes: &[OsString], race: &Race) -> Result<Self> {
+    /// The errors of [`run`], if no scene can be measured.
+    pub fn measure(scenes: &[OsString], race: &Race) -> Result<(Self, Option<Error>)> {
         scene::check(scenes)?;
         let configs = race.configs();
         let size = race.picture.size;
         let total = scenes.len() as u64 * rows(size, configs.len(), race.repeat);
         let mut progress = Progress::new("starting", total);
-        let scenes = scenes.iter().map(|spec| {
+        let mut measured = Vec::new();
+        let failed = in_turn(scenes, |spec| {
             let (scene, spec) = (Scene::load(spec)?, spec.display());
             ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
             tell(&scene);
@@ -82,11 +84,15 @@ impl Results {
             progress.set_scope(&display_name(&facts.scene));
             let methods = measure_diffuse(&scene, &configs, race, &mut progress)
                 .with_context(|| format!("cannot measure `{spec}`"))?;
-            Ok(SceneResults { facts, methods })
+            measured.push(SceneResults { facts, methods });
+            Ok(())
         });
-        let scenes = scenes.collect::<Result<_>>()?;
         let (repeats, threads) = (race.repeat, race.builders.threads);
-        Ok(Self { machine: Machine::here(), size, repeats, threads, scenes })
+        let scenes = measured;
+        match failed {
+            Some(error) if scenes.is_empty() => Err(error),
+            _ => Ok((Self { machine: Machine::here(), size, repeats, threads, scenes }, failed)),
+        }
     }
 
     /// Formats the table as aligned text, with notes and the origin of the numbers.
@@ -95,13 +101,14 @@ impl Results {
         let mut table = self.table(|title| format!("\n{title}"), "  ");
         table.load_style(presets::NOTHING);
         let notes = self.notes().join("\n");
-        [table.trim_fmt(), notes, self.machine.summary()].join("\n\n")
+        [table.trim_fmt(), notes, self.machine.summary(self.threads)].join("\n\n")
     }
 
     /// Formats the same as Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
+        let summary = self.machine.summary(self.threads);
+        let source = format!("{summary}. Command: `{}`.", self.machine.command);
         [self.markdown_table(), source].join("\n\n")
     }
 
@@ -186,9 +193,6 @@ impl Results {
         let mut methods = self.scenes.iter().flat_map(|scene| &scene.methods);
         if methods.any(Measurement::is_in_tiles) {
             notes.push(format!("Trees {IN_TILES}."));
-        }
-        if self.threads > 1 {
-            notes.push(format!("Trees were built by {} threads.", self.threads));
         }
         for scene in &self.scenes {
             let name = display_name(&scene.facts.scene);
@@ -286,7 +290,26 @@ mod tests {
 
     fn results(words: &str) -> Result<Results> {
         let args = TableArgs::parse_from(["hgrid"].into_iter().chain(words.split(' ')));
-        Results::measure(&args.scenes, &args.race)
+        let (results, failed) = Results::measure(&args.scenes, &args.race)?;
+        assert!(failed.is_none(), "{failed:?}");
+        Ok(results)
+    }
+
+    #[test]
+    fn a_scene_that_fails_leaves_the_others_their_numbers() {
+        let folder = std::env::temp_dir().join(format!("hgrid-table-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let [empty, cut] = ["empty.obj", "cut.obj"].map(|name| folder.join(name));
+        std::fs::write(&empty, "v 0 0 0\n").unwrap();
+        std::fs::write(&cut, "v 0 0\n").unwrap();
+        let words = format!("hgrid {} procedural:knot:500 {}", empty.display(), cut.display());
+        let words = format!("{words} --size 16 --repeat 1");
+        let args = TableArgs::parse_from(words.split(' '));
+        let (results, failed) = Results::measure(&args.scenes, &args.race).unwrap();
+        assert_eq!(results.scenes.len(), 1);
+        let message = format!("{:#}", failed.unwrap());
+        assert!(message.contains("empty.obj") && message.contains("cut.obj"), "{message}");
+        std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
@@ -308,7 +331,7 @@ mod tests {
     fn markdown_is_a_table() {
         let words = "procedural:knot:500 --size 16 --repeat 1 --methods fixed --threads 2";
         let results = results(words).unwrap();
-        assert!(results.text().contains("built by 2 threads"));
+        assert!(results.text().contains("builds on 2 threads"));
         let markdown = results.markdown();
         let table: Vec<_> = markdown.lines().take_while(|line| !line.is_empty()).collect();
         assert!(table.iter().all(|line| line.matches('|').count() == 3), "{markdown}");

@@ -43,6 +43,31 @@ fn first_builds_have_processes_of_their_own() {
     }
 }
 
+/// A scene that cannot be measured, and an output that takes no text, leave the numbers in the file.
+#[cfg(all(feature = "embree", target_os = "linux"))]
+#[test]
+fn numbers_that_were_measured_are_kept() {
+    let folder = std::env::temp_dir().join(format!("hgrid-kept-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let [far, json] = ["far.obj", "kept.json"].map(|name| folder.join(name));
+    std::fs::write(&far, "v 900 0 0\nv 901 0 0\nv 900 1 0\nf 1 2 3\n").unwrap();
+    let words = format!(
+        "compare {} procedural:knot:500 --eye 0,0,9 --target 0,0,0 --size 16 --repeat 1 --methods bvh \
+         --peers embree-low --workloads primary --json {}",
+        far.display(),
+        json.display()
+    );
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = command.args(words.split(' ')).stdout(full).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && error.contains("far.obj`: no ray hits"), "{error}");
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let scenes = json["scenes"].as_array().unwrap();
+    assert_eq!((scenes.len(), &scenes[0]["scene"]), (1, &"procedural:knot:500".into()));
+}
+
 #[cfg(feature = "embree")]
 #[test]
 fn instances_are_for_trees_and_embree() {

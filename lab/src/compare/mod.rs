@@ -88,17 +88,20 @@ fn measure(args: &CompareArgs, mut systems: Vec<Box<dyn System>>) -> Result<()> 
     leave_out(&mut systems, &mut workloads, shown)?;
     let amount = Amount::of(&workloads);
     let plan = Plan { repeat: args.repeat, workloads, amount, shown, first };
-    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, &plan)?;
+    // A scene takes minutes: its numbers are in the file before the next one begins.
+    let keep = |comparison: &Comparison| {
+        let Some(path) = &args.json else { return Ok(()) };
+        let json = serde_json::to_string_pretty(comparison)? + "\n";
+        fs::write(path, json).with_context(|| format!("cannot write `{}`", path.display()))
+    };
+    let (comparison, failed) =
+        Comparison::measure(&args.scenes, &systems, &args.picture, &plan, keep)?;
+    let drawn = args.output.as_ref().map_or(Ok(()), |folder| comparison.draw(folder));
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
-    writeln!(io::stdout(), "{text}")?;
-    if let Some(path) = &args.json {
-        let json = serde_json::to_string_pretty(&comparison)? + "\n";
-        fs::write(path, json).with_context(|| format!("cannot write `{}`", path.display()))?;
-    }
-    if let Some(folder) = &args.output {
-        comparison.draw(folder)?;
-    }
-    Ok(())
+    let printed = writeln!(io::stdout(), "{text}");
+    drawn?;
+    failed.map_or(Ok(()), Err)?;
+    Ok(printed?)
 }
 
 /// Refuses to write results over a mesh.
@@ -213,7 +216,10 @@ mod tests {
             shown,
             first: first::in_this_process,
         };
-        Comparison::measure(&args.scenes, systems, &args.picture, &plan)
+        let nothing = |_: &Comparison| Ok(());
+        let (comparison, failed) =
+            Comparison::measure(&args.scenes, systems, &args.picture, &plan, nothing)?;
+        failed.map_or(Ok(comparison), Err)
     }
 
     #[test]

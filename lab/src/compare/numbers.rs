@@ -3,7 +3,7 @@
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Error, Result, ensure};
 use hgrid_core::INVALID_ID;
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ use super::{charts, tables};
 use crate::cli::Picture;
 use crate::field::Field;
 use crate::machine::Machine;
-use crate::measure::{SceneFacts, ratio};
+use crate::measure::{SceneFacts, in_turn, ratio};
 use crate::notices::tell;
 use crate::progress::Progress;
 use crate::render::unseen;
@@ -184,27 +184,35 @@ impl SystemNumbers {
 }
 
 impl Comparison {
-    /// Runs the race on each scene in turn.
+    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the error of the
+    /// others, if there are any. Calls `keep` after each scene with the numbers so far.
     ///
     /// # Errors
-    /// If a scene cannot be loaded, and those of [`race`].
+    /// If no scene can be loaded, and those of [`race`].
     pub fn measure(
         scenes: &[OsString],
         systems: &[Box<dyn System>],
         picture: &Picture,
         plan: &Plan,
-    ) -> Result<Self> {
+        keep: impl Fn(&Self) -> Result<()>,
+    ) -> Result<(Self, Option<Error>)> {
         let turns = scenes.len() as u64 * systems.len() as u64 * u64::from(plan.repeat);
         let mut progress = Progress::new("starting", turns);
-        let scenes = scenes.iter().map(|spec| {
+        let (machine, target, size, repeats) =
+            (Machine::here(), target(), picture.size, plan.repeat);
+        let mut all = Self { machine, target, size, repeats, scenes: Vec::new() };
+        let failed = in_turn(scenes, |spec| {
             progress.set_scope(&display_name(&spec.to_string_lossy()));
             progress.set_message("preparing");
-            SceneNumbers::measure(spec, systems, picture, plan, &mut progress)
-                .with_context(|| format!("cannot compare on `{}`", spec.display()))
+            let numbers = SceneNumbers::measure(spec, systems, picture, plan, &mut progress)
+                .with_context(|| format!("cannot compare on `{}`", spec.display()))?;
+            all.scenes.push(numbers);
+            keep(&all)
         });
-        let scenes = scenes.collect::<Result<_>>()?;
-        let (size, repeats) = (picture.size, plan.repeat);
-        Ok(Self { machine: Machine::here(), target: target(), size, repeats, scenes })
+        match failed {
+            Some(error) if all.scenes.is_empty() => Err(error),
+            _ => Ok((all, failed)),
+        }
     }
 
     /// Returns aligned tables, notes about their numbers, and their origin.

@@ -52,8 +52,8 @@ impl Comparison {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
-            "First build: in a new process. Rebuild: in memory that is kept from a build before. An \
-             image is a build and the primary rays in the mode beside the name."
+            "First build: in a new process, three times at least. Rebuild: in memory that is kept from a \
+             build before. An image is a build and the primary rays in the mode beside the name."
                 .to_owned(),
             format!(
                 "ao: a ray from every primary hit, {AO_REACH} of the scene's diagonal long, any \
@@ -102,7 +102,7 @@ impl Comparison {
     }
 
     fn source(&self) -> String {
-        format!("{}, compiled for {}.", self.machine.summary(), self.target)
+        format!("{}, compiled for {}.", self.machine.summary(1), self.target)
     }
 }
 

@@ -91,13 +91,9 @@ impl Drawing for Figure<'_> {
         let legend = methods.iter().map(|m| (m.title(), color_of(&m.method)));
         let legend: Vec<_> = legend.chain([("mesh".to_owned(), MUTED)]).collect();
         let title = format!("Memory and times, {size} x {size} rays");
-        let built = match threads {
-            0 | 1 => String::new(),
-            threads => format!("; trees built by {threads} threads"),
-        };
         let tiles =
             if methods.iter().any(Measurement::is_in_tiles) { "; bvh traces tiles" } else { "" };
-        let source = format!("{}; {}{tiles}{built}", machine.summary(), times(*repeats));
+        let source = format!("{}; {}{tiles}", machine.summary(*threads), times(*repeats));
         heading(area, pen, [&title, &source], &legend)?;
 
         let (_, below) = area.split_vertically(pen.px(HEADING));

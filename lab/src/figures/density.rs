@@ -188,7 +188,7 @@ impl Drawing for Figure<'_> {
         let name = display_name(&facts.scene);
         let title = format!("Times against grid density: {name}, {size} x {size} rays");
         let legend = TIMES.map(|(name, color, _)| (name.to_owned(), color));
-        let source = format!("{}; {}", machine.summary(), times(*repeats));
+        let source = format!("{}; {}", machine.summary(1), times(*repeats));
         heading(area, pen, [&title, &source], &legend)?;
 
         let (_, below) = area.split_vertically(pen.px(HEADING));

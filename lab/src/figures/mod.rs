@@ -40,12 +40,12 @@ fn measure(args: &FiguresArgs) -> Result<()> {
     if let Some(note) = curves.note() {
         say(&note);
     }
-    let results = Results::measure(&args.scenes, &args.race)?;
+    let (results, failed) = Results::measure(&args.scenes, &args.race)?;
     write(&bars::Figure(&results), &results, folder, "figure2")?;
 
     let names = ["figure1", "figure2"].map(|name| folder.join(name).display().to_string());
     writeln!(io::stdout(), "wrote {} as .svg, .png and .json", names.join(" and "))?;
-    Ok(())
+    failed.map_or(Ok(()), Err)
 }
 
 /// Draws figure 1 from the JSON file that the command wrote, as SVG.

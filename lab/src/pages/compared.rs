@@ -1,5 +1,6 @@
 //! Tables from the results of `hgrid compare`: hgrid beside other libraries.
 
+use anyhow::{Result, ensure};
 use comfy_table::{Cell, CellAlignment, Table};
 use serde::Deserialize;
 
@@ -74,8 +75,9 @@ const WORKLOADS: [&str; 6] = ["primary", "ao", "bounce", "random", "near", "far"
 /// Returns the scenes of all files with their column names, which include a named view.
 fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
     files.iter().flat_map(|file| {
-        let mut words = file.machine.command.split(' ');
-        let view = words.find(|word| *word == "--view").and_then(|_| words.next());
+        // The option's value is the next word, or stands behind `=`.
+        let words = file.machine.command.split([' ', '=']);
+        let view = words.skip_while(|word| *word != "--view").nth(1);
         let view = view.map(|view| format!(", {view}")).unwrap_or_default();
         file.scenes
             .iter()
@@ -94,19 +96,28 @@ impl Scene {
     }
 }
 
-/// Makes a table of the median ratios: a row for each ratio, a column for each scene.
-pub(super) fn ratios(files: &[Comparison]) -> String {
+/// Makes a table of the median ratios: a row for each ratio that a scene has, a column for each scene.
+///
+/// # Errors
+/// If no scene has any.
+pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
     let columns = scenes(files).map(|(name, scene)| format!("{name} {}", scene.size()));
     let mut table = table("hgrid's default / peer", columns);
-    let rows = scenes(files).next().map(|(_, scene)| &*scene.ratios).unwrap_or_default();
+    let mut rows: Vec<&str> = Vec::new();
+    for ratio in scenes(files).flat_map(|(_, scene)| &scene.ratios) {
+        if !rows.contains(&&*ratio.what) {
+            rows.push(&ratio.what);
+        }
+    }
+    ensure!(!rows.is_empty(), "no ratios: measure with peers beside hgrid");
     for row in rows {
         let cells = scenes(files).map(|(_, scene)| {
-            let ratio = scene.ratios.iter().find(|ratio| ratio.what == row.what);
+            let ratio = scene.ratios.iter().find(|ratio| ratio.what == row);
             ratio.map_or_else(String::new, |ratio| format!("{:.2}", ratio.ratio))
         });
-        table.add_row(core::iter::once(row.what.clone()).chain(cells));
+        table.add_row(core::iter::once(row.to_owned()).chain(cells));
     }
-    markdown(&mut table, 1)
+    Ok(markdown(&mut table, 1))
 }
 
 /// Makes a table for each scene: the ratios with their least and most, and the two numbers of each.
@@ -190,6 +201,52 @@ fn table(title: &str, columns: impl IntoIterator<Item = String>) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns a file of `compare` with these scenes, each with one ratio or none.
+    fn file(command: &str, scenes: &[(&str, &[&str])]) -> Comparison {
+        let mut machine = Machine::here();
+        machine.command = command.to_owned();
+        let ratio = |what: &&str| Ratio {
+            what: (*what).to_owned(),
+            hgrid: "bvh".to_owned(),
+            value: 1.0,
+            peer: "peer".to_owned(),
+            peer_value: 2.0,
+            ratio: 0.5,
+            least: 0.5,
+            most: 0.5,
+        };
+        let scene = |&(name, rows): &(&str, &[&str])| Scene {
+            scene: name.to_owned(),
+            triangles: 2000,
+            instances: 0,
+            spheres: false,
+            systems: Vec::new(),
+            ratios: rows.iter().map(ratio).collect(),
+        };
+        Comparison { machine, scenes: scenes.iter().map(scene).collect() }
+    }
+
+    #[test]
+    fn a_row_of_any_scene_is_shown() {
+        let files = [file("hgrid compare", &[("a", &[]), ("b", &["build"]), ("c", &["rays"])])];
+        let table = ratios(&files).unwrap();
+        assert!(table.contains("| build ") && table.contains("| rays "), "{table}");
+        let error = ratios(&[file("hgrid compare", &[("a", &[])])]).unwrap_err().to_string();
+        assert!(error.contains("no ratios"), "{error}");
+    }
+
+    #[test]
+    fn titles_name_the_view() {
+        for (command, title) in [
+            ("hgrid compare a --view inside --size 9", "a, inside"),
+            ("hgrid compare a --view=inside", "a, inside"),
+            ("hgrid compare a --size 9", "a"),
+        ] {
+            let files = [file(command, &[("a", &[])])];
+            assert_eq!(scenes(&files).map(|(title, _)| title).collect::<Vec<_>>(), [title]);
+        }
+    }
 
     #[test]
     fn sizes_tell_what_is_shown() {

@@ -87,10 +87,14 @@ fn stale(root: &Path) -> Result<Vec<File>> {
 
 /// Returns a page with new text between its markers; the charts go to `files`.
 fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<String> {
+    ensure!(!text.contains("\r\n"), "its lines end as on Windows: write it with `\\n` alone");
     let (mut filled, mut rest) = (String::new(), text);
     while let Some((before, behind)) = rest.split_once(BEGIN) {
         let (words, behind) = behind.split_once(" -->\n").context("a marker does not end")?;
-        let (_, behind) = behind.split_once(END).with_context(|| format!("no end of `{words}`"))?;
+        let (old, behind) =
+            behind.split_once(END).with_context(|| format!("no end of `{words}`"))?;
+        // The text up to the end of another block is not old: people wrote it.
+        ensure!(!old.contains(BEGIN), "no end of `{words}`: write `{END}` below its table");
         let block = Block { root, page, words: words.split(' ').collect() };
         let made = block.make(files).with_context(|| format!("`{words}`"))?;
         write!(filled, "{before}{BEGIN}{words} -->\n{made}\n{END}")?;
@@ -112,7 +116,7 @@ impl Block<'_> {
         let (kind, names) = self.words.split_first().context("no kind")?;
         ensure!(!names.is_empty(), "no files");
         match *kind {
-            "ratios" => Ok(compared::ratios(&self.read(names)?)),
+            "ratios" => compared::ratios(&self.read(names)?),
             "ratios-in-full" => Ok(compared::ratios_in_full(&self.read(names)?)),
             "systems" => Ok(compared::systems(&self.read(names)?)),
             "table1" => Ok(Results::merged(self.read(names)?)?.markdown_table()),
@@ -145,12 +149,15 @@ impl Block<'_> {
         #[derive(serde::Deserialize)]
         struct Source {
             machine: Machine,
+            /// Missing where one thread builds.
+            #[serde(default)]
+            threads: u32,
         }
         let lines = names.iter().map(|name| {
-            let Source { machine } = self.read_one(name)?;
+            let Source { machine, threads } = self.read_one(name)?;
             let commit = machine.commit.as_ref().map(|commit| format!(", commit {commit}"));
             let commit = commit.unwrap_or_default();
-            Ok(format!("- {name}: {}{commit}. `{}`", machine.summary(), machine.command))
+            Ok(format!("- {name}: {}{commit}. `{}`", machine.summary(threads), machine.command))
         });
         Ok(lines.collect::<Result<Vec<_>>>()?.join("\n"))
     }
@@ -254,10 +261,22 @@ mod tests {
         fs::remove_dir_all(root).unwrap();
     }
 
+    /// A lost end must not take the prose before the next block along.
+    #[test]
+    fn every_block_has_its_own_end() {
+        let block = format!("{BEGIN}sources lab/results/paper.json -->\nold\n{END}\n");
+        let fill = |text: &str| fill(&root(), "docs/page.md", text, &mut Vec::new());
+        let page = [&*block, "prose\n", &*block].concat();
+        assert!(fill(&page).unwrap().contains("prose"));
+        let error = format!("{:#}", fill(&page.replacen(END, "", 1)).unwrap_err());
+        assert!(error.starts_with("no end of `sources lab/results/paper.json`: write"), "{error}");
+    }
+
     #[test]
     fn wrong_markers_are_errors() {
         for (text, words) in [
             (format!("{BEGIN}ratios"), "does not end"),
+            (format!("{BEGIN}ratios a.json -->\r\n{END}"), "lines end as on Windows"),
             (format!("{BEGIN}ratios a.json -->\n"), "no end"),
             (format!("{BEGIN}ratios a.json -->\n{END}"), "a.json"),
             (format!("{BEGIN}ratios -->\n{END}"), "no files"),

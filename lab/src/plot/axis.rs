@@ -32,7 +32,7 @@ impl Scale {
     }
 
     fn linear(high: f64, headroom: f64) -> Self {
-        let end = high / (1.0 - headroom);
+        let end = (high / (1.0 - headroom)).min(f64::MAX);
         let step = nice_above(end / 7.0);
         let below = |amounts: [f64; 8]| amounts.into_iter().filter(|&a| a <= end).collect();
         let steps = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
@@ -43,8 +43,9 @@ impl Scale {
 
     fn logarithmic(low: f64, high: f64, headroom: f64) -> Self {
         // The axis starts well below the smallest amount, so that the shortest bar is visible.
-        let start = nice_below(low / 1.5);
-        let end = start * (high / start).powf(1.0 / (1.0 - headroom));
+        let start = nice_below((low / 1.5).max(f64::MIN_POSITIVE));
+        // Decades are counted, so the start is above zero and the end is finite.
+        let end = (start * (high / start).powf(1.0 / (1.0 - headroom))).min(f64::MAX);
         let decades = decade(start)..=decade(end);
         let few = (end / start).log10() < 2.5;
         let (mut labelled, mut light) = (Vec::new(), Vec::new());
@@ -198,6 +199,15 @@ mod tests {
         for amounts in [vec![], vec![0.0], vec![5.0]] {
             let scale = Scale::fitting(amounts.into_iter(), 0.2);
             assert!(scale.range.end > scale.range.start && !scale.labelled.is_empty());
+        }
+    }
+
+    #[test]
+    fn scales_of_any_amounts_end() {
+        for amounts in [[f64::MAX, f64::MAX], [1.0, f64::MAX], [5e-324, 1.0], [5e-324, f64::MAX]] {
+            let scale = Scale::fitting(amounts.into_iter(), 0.2);
+            assert!(scale.range.start >= 0.0 && scale.range.end.is_finite(), "{:?}", scale.range);
+            assert!(scale.labelled.len() < 2000, "{amounts:?}");
         }
     }
 

@@ -32,7 +32,7 @@ impl Drawing for Figure<'_> {
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Comparison { machine, scenes, .. } = self.0;
         // Bytes do not depend on large pages, so the caption leaves those out.
-        let source = Machine { large_pages: None, ..machine.clone() }.summary();
+        let source = Machine { large_pages: None, ..machine.clone() }.summary(1);
         let legend = scenes.iter().zip(0..);
         let legend: Vec<_> =
             legend.map(|(scene, place)| (display_name(&scene.facts.scene), color(place))).collect();

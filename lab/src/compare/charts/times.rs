@@ -79,7 +79,7 @@ impl Drawing for Figure<'_> {
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Comparison { machine, size, repeats, .. } = self.0;
         let title = format!("Time to image, {size} x {size} rays, against triangles");
-        let source = format!("{}; {}", machine.summary(), times(*repeats));
+        let source = format!("{}; {}", machine.summary(1), times(*repeats));
         heading(area, pen, [&title, &source], &[])?;
 
         let (_, below) = area.split_vertically(pen.px(HEADING));
