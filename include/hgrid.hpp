@@ -123,7 +123,7 @@ using point = std::array<float, 3>;
 
 /// The id that no triangle has; in a hit of a batch, a miss.
 HGRID_INLINE constexpr std::uint32_t invalid_id = HGRID_INVALID_ID;
-/// Every region and every blob starts at a multiple of this many bytes.
+/// The alignment, in bytes, of every blob, index and scratch of a build. See `HGRID_ALIGNMENT`.
 HGRID_INLINE constexpr std::size_t alignment = HGRID_ALIGNMENT;
 
 #if defined(__GNUC__)
@@ -585,7 +585,7 @@ span<const byte> as_bytes(const C &container) noexcept
             detail::size_of(container) * sizeof(*detail::data_of(container))};
 }
 
-/// The bytes are those of the elements, which must be there as long: give them a name.
+/// The bytes are those of the elements, which must live as long: give the elements a name.
 template <class C, std::enable_if_t<!detail::stays<C &&>::value, int> = 0>
 span<const byte> as_bytes(C &&) = delete;
 
@@ -796,7 +796,7 @@ public:
         const bool is_one_each = masks.size() == raw_.triangle_count;
         static const std::uint32_t none = 0;
         raw_.masks = is_one_each ? masks.first() : &none;
-        // No masks lie closer to each other than their four bytes: that is what is refused.
+        // A call refuses a stride below the four bytes of a mask, so 1 marks a wrong number of masks.
         raw_.mask_stride = is_one_each ? masks.stride() : 1;
         return *this;
     }
@@ -1448,8 +1448,8 @@ private:
 /// A built grid and its memory. The mesh stays the caller's, unless `keep` takes it over.
 ///
 /// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
-/// for as long as the grid is. Moving it does not move the memory. After a move, make the objects of
-/// scenes that show it again.
+/// for as long as the grid is. Moving the grid does not move the memory. After a move, make
+/// objects of it anew for the scenes that show it.
 class grid : public view {
 public:
     /// No grid; hits nothing.

@@ -34,7 +34,8 @@ use crate::types::hgrid_grid;
 /// hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
 /// side. Neither array needs any alignment, and bytes between elements are neither read nor written.
 /// No hit may overlap a ray, nor anything else that the call uses, such as blob and mesh with the bytes
-/// between its vertices, which the call does not check; if rays and hits interleave, their strides must be equal.
+/// between its vertices; the call compares hits only with rays and `scratch`. If rays and hits interleave, their
+/// strides must be equal.
 ///
 /// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
 /// the hits. For rays without any order lend memory to sort them in, and pass as many as you have in

@@ -31,16 +31,16 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_repor
 /// ```
 ///
 /// `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are
-/// only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps
-/// neither the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a
-/// grid of the joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
-/// triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds
-/// the number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over
-/// the parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another
-/// build; after arrays moved or counts changed, join the meshes again.
+/// only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither
+/// the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
+/// joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without triangles.
+/// `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the number of
+/// all triangles and vertices, and `parts`; its other fields are 0 or NULL. Every call that takes it, `hgrid_open` too,
+/// first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
+/// after arrays moved or counts changed, join the meshes again.
 ///
-/// The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
-/// counts of the first meshes off it.
+/// The report of a build that fails names the triangle to blame by its number in the joined mesh: subtract the
+/// triangle counts of the meshes before its own.
 ///
 /// Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold
 /// anything:

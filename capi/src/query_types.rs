@@ -135,8 +135,8 @@ pub struct hgrid_query_options {
     pub mask: u32,
     /// The sides that are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
-    /// A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
-    /// epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
+    /// A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. Skipping needs
+    /// no epsilon, but a neighbour across an edge may still be hit if rounding put the origin below that neighbour. All
     /// rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any. 0 skips
     /// triangle 0.
     pub skip: u32,

@@ -100,7 +100,7 @@ pub struct hgrid_scene_hit {
     pub v: f32,
     /// The triangle or shape in its object.
     pub primitive: u32,
-    /// The instance in the outermost scene, in the scene that it shows, and so on; the rest is `HGRID_INVALID_ID`.
+    /// Numbers of the instances that lead to the hit, from the outermost scene inwards; the rest is `HGRID_INVALID_ID`.
     pub path: [u32; HGRID_MAX_NESTING],
 }
 
@@ -131,7 +131,8 @@ pub struct hgrid_scene_options {
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,
-    /// The counters that the work is added to, or NULL. An instance that a ray is offered counts as a test.
+    /// The counters that the work is added to, or NULL. An instance that a ray is tested against counts in
+    /// `primitive_tests`.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
     /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries
@@ -386,8 +387,8 @@ pub unsafe extern "C" fn hgrid_open_scene(
 /// and leaves `scene` as it was: `HGRID_ERROR_MESH_MISMATCH` for another number of instances; what `hgrid_open_scene`
 /// returns; `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` or `HGRID_ERROR_OVERLAP`;
 /// `HGRID_ERROR_INSTANCE_OBJECT` or `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the report's
-/// `triangle`. After the last two, and if the blob is corrupt, it may hold nothing of use; after all others it is as it
-/// was.
+/// `triangle`. After the last two, and if it was corrupt, the blob may hold nothing of use; after all others it is as
+/// it was.
 ///
 /// Threads: as for `hgrid_refit`.
 ///
@@ -415,8 +416,8 @@ pub unsafe extern "C" fn hgrid_refit_scene(
     unsafe { raw::reporting_refit(report, call) }
 }
 
-/// Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree
-/// and the box of every instance. The objects have proofs of their own.
+/// Proves that a scene's tree and the box of every instance fit its objects, in
+/// `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch. The objects have proofs of their own.
 ///
 /// `scene` may not be NULL; `scratch` may be if `scratch_bytes` is 0. Returns `HGRID_OK`, or what
 /// `hgrid_validate_shapes` returns.
@@ -565,7 +566,7 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
 /// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
 /// that it shows.
 ///
-/// Of a scene that was opened with objects of yours these are yours; of a packed scene they lie in its blob.
+/// `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
 /// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
 /// `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
 /// `hit` is NULL, or the hit names nothing in the scene.

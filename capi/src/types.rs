@@ -19,8 +19,8 @@ use crate::status::{
     HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 
-/// These start at a multiple of this many bytes: index, every blob, the `views` of `hgrid_open_packed_scene`, and the
-/// scratch of builds, `hgrid_sizes` and `hgrid_fit`. All other scratch may start anywhere.
+/// The alignment, in bytes, of these: index, every blob, the `views` of `hgrid_open_packed_scene`, and the scratch of
+/// builds, `hgrid_sizes` and `hgrid_fit`. All other scratch may start anywhere.
 pub const HGRID_ALIGNMENT: usize = 64;
 
 /// The version of the blob format, the same for all methods. A blob of another version is refused:
