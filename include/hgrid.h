@@ -141,7 +141,7 @@
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
  * batch right after its rays. Views, hits and other results are written only when a call succeeds.
- * A report is written in both cases, and so is the size that hgrid_pack and its like ask for. A region
+ * A report is written after an error, too, and so is the size that hgrid_pack and its like tell. A region
  * (index, scratch, parts, the room for a packed blob or for views) may hold anything after an error,
  * unless the call says otherwise.
  *
@@ -282,8 +282,8 @@
 #define HGRID_VERSION_STRING "0.1.0"
 
 /**
- * These start at a multiple of this many bytes: index, every blob, the `views` of `hgrid_open_packed_scene`, and the
- * scratch of builds, `hgrid_sizes` and `hgrid_fit`. All other scratch may start anywhere.
+ * The alignment, in bytes, of these: index, every blob, the `views` of `hgrid_open_packed_scene`, and the scratch of
+ * builds, `hgrid_sizes` and `hgrid_fit`. All other scratch may start anywhere.
  */
 #define HGRID_ALIGNMENT 64
 
@@ -842,8 +842,8 @@ typedef struct hgrid_query_options {
      */
     uint32_t cull;
     /**
-     * A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
-     * epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
+     * A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. Skipping needs
+     * no epsilon, but a neighbour across an edge may still be hit if rounding put the origin below that neighbour. All
      * rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any. 0 skips
      * triangle 0.
      */
@@ -1314,7 +1314,7 @@ typedef struct hgrid_scene_hit {
      */
     uint32_t primitive;
     /**
-     * The instance in the outermost scene, in the scene that it shows, and so on; the rest is `HGRID_INVALID_ID`.
+     * Numbers of the instances that lead to the hit, from the outermost scene inwards; the rest is `HGRID_INVALID_ID`.
      */
     uint32_t path[HGRID_MAX_NESTING];
 } hgrid_scene_hit;
@@ -1357,7 +1357,8 @@ typedef struct hgrid_scene_options {
      */
     hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
     /**
-     * The counters that the work is added to, or NULL. An instance that a ray is offered counts as a test.
+     * The counters that the work is added to, or NULL. An instance that a ray is tested against counts in
+     * `primitive_tests`.
      */
     struct hgrid_counters *counters;
     /**
@@ -1728,16 +1729,16 @@ extern "C" {
  * ```
  *
  * `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are
- * only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps
- * neither the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a
- * grid of the joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
- * triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds
- * the number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over
- * the parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another
- * build; after arrays moved or counts changed, join the meshes again.
+ * only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither
+ * the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
+ * joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without triangles.
+ * `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the number of
+ * all triangles and vertices, and `parts`; its other fields are 0 or NULL. Every call that takes it, `hgrid_open` too,
+ * first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
+ * after arrays moved or counts changed, join the meshes again.
  *
- * The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
- * counts of the first meshes off it.
+ * The report of a build that fails names the triangle to blame by its number in the joined mesh: subtract the
+ * triangle counts of the meshes before its own.
  *
  * Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold
  * anything:
@@ -2183,7 +2184,8 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
  * side. Neither array needs any alignment, and bytes between elements are neither read nor written.
  * No hit may overlap a ray, nor anything else that the call uses, such as blob and mesh with the bytes
- * between its vertices, which the call does not check; if rays and hits interleave, their strides must be equal.
+ * between its vertices; the call compares hits only with rays and `scratch`. If rays and hits interleave, their
+ * strides must be equal.
  *
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
  * the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
@@ -2758,8 +2760,8 @@ hgrid_status hgrid_open_scene(const void *blob,
  * and leaves `scene` as it was: `HGRID_ERROR_MESH_MISMATCH` for another number of instances; what `hgrid_open_scene`
  * returns; `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` or `HGRID_ERROR_OVERLAP`;
  * `HGRID_ERROR_INSTANCE_OBJECT` or `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the report's
- * `triangle`. After the last two, and if the blob is corrupt, it may hold nothing of use; after all others it is as it
- * was.
+ * `triangle`. After the last two, and if it was corrupt, the blob may hold nothing of use; after all others it is as
+ * it was.
  *
  * Threads: as for `hgrid_refit`.
  */
@@ -2773,8 +2775,8 @@ hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
                                struct hgrid_refit_report *report);
 
 /**
- * Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree
- * and the box of every instance. The objects have proofs of their own.
+ * Proves that a scene's tree and the box of every instance fit its objects, in
+ * `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch. The objects have proofs of their own.
  *
  * `scene` may not be NULL; `scratch` may be if `scratch_bytes` is 0. Returns `HGRID_OK`, or what
  * `hgrid_validate_shapes` returns.
@@ -2872,7 +2874,7 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
  * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
  * that it shows.
  *
- * Of a scene that was opened with objects of yours these are yours; of a packed scene they lie in its blob.
+ * `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
  * The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
  * `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
  * `hit` is NULL, or the hit names nothing in the scene.

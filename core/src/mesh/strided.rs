@@ -26,7 +26,8 @@ impl fmt::Debug for Strided<'_> {
 }
 
 impl<'a> Strided<'a> {
-    /// Elements that lie side by side: numbers, arrays of them, and structs that derive these traits.
+    /// Elements that lie side by side: numbers, arrays of them, and structs that derive these traits of the crate
+    /// `zerocopy` (0.8, with its feature `derive`).
     ///
     /// ```
     /// use hgrid_core::Strided;
