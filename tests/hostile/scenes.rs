@@ -1,12 +1,15 @@
 //! Damaged scenes: opening and queries end, and a scene that `validate` accepts answers as the one that was built.
 
-use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, SceneHit};
+use hgrid_core::{Block, Config, Error, Grid, Instance, Object, RayF64, Scene, SceneHit};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 use hgrid_tests::{rounds, setting};
+
+/// The offset in a header of the number of skipped instances (docs/format.md).
+const SKIPPED_COUNT: usize = 36;
 
 /// Returns the number of mutants of each kind of scene.
 fn mutants() -> u64 {
@@ -97,6 +100,14 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         let copy = Copy::of(&bytes[..length]);
         assert!(Scene::open(copy.bytes(), &objects).is_err(), "{length}");
     }
+    // A refit that refuses a header has changed nothing.
+    let mut copy = Copy::of(bytes);
+    copy.set_word(SKIPPED_COUNT, 1);
+    copy.sign();
+    let before = copy.bytes().to_vec();
+    let refused = Scene::refit(copy.bytes_mut(), &scattered(25, 2, 1.0, 7), &objects);
+    assert_eq!(refused.map(|_| ()), Err(Error::Corrupt { offset: SKIPPED_COUNT as u64 }));
+    assert!(copy.bytes() == before);
 }
 
 /// Returns the offsets of words in a packed scene's header, its references, and the headers of all members.

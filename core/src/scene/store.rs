@@ -312,8 +312,12 @@ impl<'a> Scene<'a> {
         if scene.instance_count() as usize != instances.len() {
             return Err(Error::MeshMismatch);
         }
-        let (start, _) = ends_of(&Header::peek(index)?);
-        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        let header = Header::peek(index)?;
+        // No build of a scene skips an instance. The refit below would refuse the number, but after the bytes changed.
+        if header.skipped_count > 0 {
+            return Err(corrupt(offset_of!(Header, skipped_count)));
+        }
+        let start = usize::try_from(ends_of(&header).0).unwrap_or(usize::MAX);
         let damaged = corrupt(offset_of!(Header, triangle_count));
         let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
         refit(head, &fill(tail, instances, objects, damaged)?)
