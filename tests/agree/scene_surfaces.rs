@@ -1,7 +1,8 @@
 //! Rays that leave a surface of a scene do not hit it, wherever its instance stands and however it is transformed.
 
 use hgrid_core::{
-    Config, Instance, Object, RayF64, Scene, SceneHit, SceneOptions, SceneSurface, Verdict,
+    Config, Instance, Object, RayF64, Scene, SceneHit, SceneOptions, SceneSurface, TriangleMesh,
+    Verdict,
 };
 use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
@@ -121,6 +122,108 @@ fn a_convex_object_hides_nothing_from_itself() {
         }
         assert!(blocked > 100, "{blocked}");
     }
+}
+
+/// A matrix that turns.
+fn turn(random: &mut Random) -> [Vector; 3] {
+    let [a, b, _] = random.point().map(|angle| f64::from(angle) * 3.0);
+    let ((sin, cos), (tilt_sin, tilt_cos)) = (a.sin_cos(), b.sin_cos());
+    [
+        [cos, -sin, 0.0],
+        [sin * tilt_cos, cos * tilt_cos, -tilt_sin],
+        [sin * tilt_sin, cos * tilt_sin, tilt_cos],
+    ]
+}
+
+fn product(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
+    a.map(|row| [0, 1, 2].map(|k| row[0] * b[0][k] + row[1] * b[1][k] + row[2] * b[2][k]))
+}
+
+/// Triangles across `axis`, at most about 1 from the origin.
+fn across(axis: Vector, random: &mut Random) -> Vec<[[f32; 3]; 3]> {
+    let mut triangle = || {
+        let middle = random.point();
+        [(); 3].map(|()| {
+            let side = random.point().map(|c| 0.3 * f64::from(c));
+            let along = dot(side, axis);
+            [0, 1, 2].map(|k| (f64::from(middle[k]) + side[k] - along * axis[k]) as f32)
+        })
+    };
+    (0..30).map(|_| triangle()).collect()
+}
+
+/// Rule 6 of docs/renderers.md: offsets that a renderer computes itself, in an instance that is as large as `stretch`
+/// and `condition` times thinner on one axis. The triangles face its longest axis: there a rounded inverse, which mixes
+/// the axes, moves them by most. Returns how many rays left a triangle, and how many of them hit it.
+fn own_offsets(stretch: f64, condition: f64, rule: impl Fn(f64) -> f64) -> (usize, usize) {
+    let mut random = Random(66);
+    let (mut count, mut hit_count) = (0, 0);
+    for _ in 0..60 {
+        let inner = turn(&mut random);
+        let scales = [stretch, stretch / condition.sqrt(), stretch / condition];
+        let scaled = [0, 1, 2].map(|row: usize| inner[row].map(|c| c * scales[row]));
+        let linear = product(&turn(&mut random), &scaled).map(|row| row.map(|c| c as f32));
+        let triangles = across(inner[0], &mut random);
+        let positions = triangles.concat();
+        let indices: Vec<[u32; 3]> =
+            (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let view = TriangleMesh::new(&positions, &indices).unwrap();
+        let owned = Owned::build(&view, &Config::default()).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let objects = [Object::Grid(&grid)];
+        let translation = random.point().map(|c| 3.0 * stretch * f64::from(c));
+        let instances = [Instance { linear, translation, ..Instance::new(0) }];
+        let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+        let scene = built.open(&objects).unwrap();
+        let to_scene = |v: Vector| linear.map(|row| dot(row.map(f64::from), v));
+        let corners = |axis: usize| positions.iter().map(move |p| f64::from(p[axis]));
+        let [low, high] =
+            [f64::min, f64::max].map(|pick| [0, 1, 2].map(|k| corners(k).reduce(pick).unwrap()));
+        let extent = (0..3).map(|k| high[k] - low[k]).reduce(f64::max).unwrap();
+        let largest = low.iter().chain(&high).map(|c| c.abs()).reduce(f64::max).unwrap();
+        for _ in 0..500 {
+            let [from, to] = [random.point(), random.point()].map(|p| p.map(f64::from));
+            let from = to_scene(from.map(|c| 2.0 * c));
+            let origin = [0, 1, 2].map(|k| from[k] + translation[k]);
+            let ray = RayF64::new(origin, to_scene(to).map(|c| c as f32));
+            let Some(hit) = scene.intersect(&ray) else { continue };
+            let normal = scene.triangle_normal(&hit).unwrap().map(f64::from);
+            let side = -dot(normal, ray.direction.map(f64::from)).signum();
+            let [a, b, c] = triangles[hit.primitive as usize];
+            let [u, v] = [hit.u, hit.v].map(f64::from);
+            let weighted = |k: usize| {
+                (1.0 - u - v) * f64::from(a[k]) + u * f64::from(b[k]) + v * f64::from(c[k])
+            };
+            let point = to_scene([0, 1, 2].map(weighted));
+            let offset = side * rule(extent + largest);
+            let start = [0, 1, 2].map(|k| point[k] + translation[k] + offset * normal[k]);
+            let leaves = loop {
+                let direction = leaving(&mut random, normal, side);
+                let along = direction.map(f64::from);
+                if dot(along, normal).abs() > 0.1 * dot(along, along).sqrt() {
+                    break RayF64::new(start, direction);
+                }
+            };
+            count += 1;
+            hit_count += usize::from(meets(&scene, &leaves, &hit));
+        }
+    }
+    (count, hit_count)
+}
+
+#[test]
+fn offsets_as_the_page_for_renderers_gives_them_are_enough() {
+    let base = 0.5_f64.powi(19);
+    for stretch in [1e-3, 1.0, 1e3] {
+        for condition in [1.0, 30.0, 1000.0, 3000.0] {
+            let rule = |size| stretch * (base + 0.5_f64.powi(22) * condition) * size;
+            let (count, hit_count) = own_offsets(stretch, condition, rule);
+            assert!(count > 300 && hit_count == 0, "{stretch} {condition}: {hit_count} of {count}");
+        }
+    }
+    // Neither the stretch nor the condition number can be left out.
+    assert!(own_offsets(1e3, 1.0, |size| base * size).1 > 50);
+    assert!(own_offsets(1.0, 3000.0, |size| base * size).1 > 5);
 }
 
 #[test]
