@@ -193,6 +193,19 @@ fn pkg_config_finds_the_library_in_the_archive() {
     run(compile.arg("-o").arg(&path));
     let printed = output_of(program(&path).env("LD_LIBRARY_PATH", folder.join("lib")));
     assert!(printed.ends_with(HIT), "{printed}");
+
+    // The static library of hgrid alone, as docs/install.md links it: `--static` takes the shared one.
+    let mut ask = without_rust(command("pkg-config"));
+    ask.env("PKG_CONFIG_PATH", folder.join("lib/pkgconfig"));
+    let libdir = output_of(ask.args(["--variable=libdir", "hgrid"]));
+    let library = Path::new(libdir.trim()).join("libhgrid.a");
+    let includes = answer.split_whitespace().filter(|flag| !flag.starts_with("-l"));
+    let mut compile = without_rust(bare_compiler());
+    compile.arg(root().join("c_examples/minimal.c")).args(includes).arg(library);
+    run(compile.arg("-o").arg(&path));
+    assert!(!dynamic(&path, "NEEDED").contains(&soname()));
+    let printed = output_of(&mut program(&path));
+    assert!(printed.ends_with(HIT), "{printed}");
 }
 
 /// Builds a project that has hgrid in a subfolder, and runs its two programs.
