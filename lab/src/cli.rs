@@ -332,7 +332,7 @@ pub struct CompareArgs {
     /// Print Markdown
     #[arg(long)]
     pub markdown: bool,
-    /// Write every number and the machine they come from to this file
+    /// Write every number and the machine they come from to this file, after each scene
     #[arg(long, value_name = "FILE", value_parser = output_parser())]
     pub json: Option<PathBuf>,
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
