@@ -1,12 +1,15 @@
-//! The size of a program with the library in it, as docs/embedded.md gives it.
+//! What a binary with the static library in it contains: as many bytes as docs/embedded.md says, and no exports of
+//! hgrid's with the flag that docs/install.md gives.
 
 use std::fs;
 use std::path::Path;
 
 use hgrid_program_tests::sizes::check_sizes;
 use hgrid_tests::artefact::{compiler, root, run, static_library};
-use hgrid_tests::tools::leave_out;
+use hgrid_tests::tools::{command, is_installed, leave_out};
 use tempfile::TempDir;
+
+use crate::prefix::output_of;
 
 /// The largest acceptable size of a program with all methods.
 const MOST_BYTES: u64 = 300_000;
@@ -22,6 +25,25 @@ fn minimal_is_as_small_as_the_page_says() {
     let words = ["stripped: ", " bytes, of which ", "it is ", " bytes, of which "];
     let [whole, whole_library] = measure(&[]);
     check_sizes(words, [program, library, whole, whole_library]);
+}
+
+#[test]
+fn a_shared_library_can_keep_hgrid_inside() {
+    if !cfg!(target_os = "linux") || !is_installed("binutils") {
+        leave_out("the flag is that of linkers for ELF");
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let plugin = dir.path().join("plugin.so");
+    let exports = |flags: &[&str]| {
+        let mut compiler = compiler("c99");
+        compiler.args(["-shared", "-fPIC"]).args(flags).arg(root().join("c_examples/minimal.c"));
+        run(compiler.arg(static_library()).arg("-o").arg(&plugin));
+        output_of(command("nm").args(["-D", "--defined-only"]).arg(&plugin))
+    };
+    assert!(exports(&[]).contains(" hgrid_build\n"));
+    let inside = exports(&["-Wl,--exclude-libs,libhgrid.a"]);
+    assert!(inside.contains(" main\n") && !inside.contains(" hgrid_"), "{inside}");
 }
 
 /// Returns the size of the stripped program, and the bytes in it that come from the library.
