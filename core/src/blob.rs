@@ -233,6 +233,20 @@ impl Header {
         }
     }
 
+    /// Returns an error for what no build of a scene writes: another method than bvh, a mesh, skipped instances.
+    pub(crate) const fn check_scene(&self) -> Result<(), Error> {
+        if self.method != Method::Bvh as u32 {
+            return Err(corrupt(core::mem::offset_of!(Self, method)));
+        }
+        if self.mesh != HasMesh::No as u32 {
+            return Err(corrupt(core::mem::offset_of!(Self, mesh)));
+        }
+        if self.skipped_count != 0 {
+            return Err(corrupt(core::mem::offset_of!(Self, skipped_count)));
+        }
+        Ok(())
+    }
+
     /// Returns the number of parts that the mesh behind the grid was joined from; 0 if it was not.
     pub(crate) const fn part_count(&self) -> u32 {
         self.mesh >> 2

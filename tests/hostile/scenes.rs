@@ -8,8 +8,9 @@ use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 use hgrid_tests::{rounds, setting};
 
-/// The offset in a header of the number of skipped instances (docs/format.md).
+/// Offsets in a header (docs/format.md).
 const SKIPPED_COUNT: usize = 36;
+const MESH: usize = 108;
 
 /// Returns the number of mutants of each kind of scene.
 fn mutants() -> u64 {
@@ -101,13 +102,15 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         assert!(Scene::open(copy.bytes(), &objects).is_err(), "{length}");
     }
     // A refit that refuses a header has changed nothing.
-    let mut copy = Copy::of(bytes);
-    copy.set_word(SKIPPED_COUNT, 1);
-    copy.sign();
-    let before = copy.bytes().to_vec();
-    let refused = Scene::refit(copy.bytes_mut(), &scattered(25, 2, 1.0, 7), &objects);
-    assert_eq!(refused.map(|_| ()), Err(Error::Corrupt { offset: SKIPPED_COUNT as u64 }));
-    assert!(copy.bytes() == before);
+    for offset in [SKIPPED_COUNT, MESH] {
+        let mut copy = Copy::of(bytes);
+        copy.set_word(offset, 1);
+        copy.sign();
+        let before = copy.bytes().to_vec();
+        let refused = Scene::refit(copy.bytes_mut(), &scattered(25, 2, 1.0, 7), &objects);
+        assert_eq!(refused.map(|_| ()), Err(Error::Corrupt { offset: offset as u64 }));
+        assert!(copy.bytes() == before);
+    }
 }
 
 /// Returns the offsets of words in a packed scene's header, its references, and the headers of all members.

@@ -313,10 +313,8 @@ impl<'a> Scene<'a> {
             return Err(Error::MeshMismatch);
         }
         let header = Header::peek(index)?;
-        // No build of a scene skips an instance. The refit below would refuse the number, but after the bytes changed.
-        if header.skipped_count > 0 {
-            return Err(corrupt(offset_of!(Header, skipped_count)));
-        }
+        // The refit below would refuse such a header, too, but after the bytes changed.
+        header.check_scene()?;
         let start = usize::try_from(ends_of(&header).0).unwrap_or(usize::MAX);
         let damaged = corrupt(offset_of!(Header, triangle_count));
         let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
