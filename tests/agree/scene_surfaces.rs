@@ -155,8 +155,12 @@ fn across(axis: Vector, random: &mut Random) -> Vec<[[f32; 3]; 3]> {
 /// Rule 6 of docs/renderers.md: offsets that a renderer computes itself, in an instance that is as large as `stretch`
 /// and `condition` times thinner on one axis. The triangles face its longest axis: there a rounded inverse, which mixes
 /// the axes, moves them by most. Returns how many rays left a triangle, and how many of them hit it.
-fn own_offsets(stretch: f64, condition: f64, rule: impl Fn(f64) -> f64) -> (usize, usize) {
+fn own_offsets(
+    [stretch, condition, distance]: [f64; 3],
+    rule: impl Fn(f64, f64) -> f64,
+) -> (usize, usize) {
     let mut random = Random(66);
+    let least_angle = 1e-4_f64.max(0.5_f64.powi(23) * condition);
     let (mut count, mut hit_count) = (0, 0);
     for _ in 0..60 {
         let inner = turn(&mut random);
@@ -171,7 +175,7 @@ fn own_offsets(stretch: f64, condition: f64, rule: impl Fn(f64) -> f64) -> (usiz
         let owned = Owned::build(&view, &Config::default()).unwrap();
         let grid = owned.open(&view).unwrap();
         let objects = [Object::Grid(&grid)];
-        let translation = random.point().map(|c| 3.0 * stretch * f64::from(c));
+        let translation = random.point().map(|c| distance * f64::from(c));
         let instances = [Instance { linear, translation, ..Instance::new(0) }];
         let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
         let scene = built.open(&objects).unwrap();
@@ -195,12 +199,14 @@ fn own_offsets(stretch: f64, condition: f64, rule: impl Fn(f64) -> f64) -> (usiz
                 (1.0 - u - v) * f64::from(a[k]) + u * f64::from(b[k]) + v * f64::from(c[k])
             };
             let point = to_scene([0, 1, 2].map(weighted));
-            let offset = side * rule(extent + largest);
-            let start = [0, 1, 2].map(|k| point[k] + translation[k] + offset * normal[k]);
+            let point = [0, 1, 2].map(|k| point[k] + translation[k]);
+            let far = point.iter().chain(&translation).map(|c| c.abs()).fold(0.0, f64::max);
+            let offset = side * rule(extent + largest, far);
+            let start = [0, 1, 2].map(|k| point[k] + offset * normal[k]);
             let leaves = loop {
                 let direction = leaving(&mut random, normal, side);
                 let along = direction.map(f64::from);
-                if dot(along, normal).abs() > 0.1 * dot(along, along).sqrt() {
+                if dot(along, normal).abs() > least_angle * dot(along, along).sqrt() {
                     break RayF64::new(start, direction);
                 }
             };
@@ -213,17 +219,21 @@ fn own_offsets(stretch: f64, condition: f64, rule: impl Fn(f64) -> f64) -> (usiz
 
 #[test]
 fn offsets_as_the_page_for_renderers_gives_them_are_enough() {
-    let base = 0.5_f64.powi(19);
+    let (base, far_base) = (0.5_f64.powi(19), 0.5_f64.powi(49));
     for stretch in [1e-3, 1.0, 1e3] {
         for condition in [1.0, 30.0, 1000.0, 3000.0] {
-            let rule = |size| stretch * (base + 0.5_f64.powi(22) * condition) * size;
-            let (count, hit_count) = own_offsets(stretch, condition, rule);
-            assert!(count > 300 && hit_count == 0, "{stretch} {condition}: {hit_count} of {count}");
+            for distance in [0.0, 3.0, 1e6, 1e10] {
+                let size = |e: f64| stretch * (base + 0.5_f64.powi(22) * condition) * e;
+                let place = [stretch, condition, distance * stretch];
+                let (count, hit_count) = own_offsets(place, |e, far| size(e) + far_base * far);
+                assert!(count > 300 && hit_count == 0, "{place:?}: {hit_count} of {count}");
+            }
         }
     }
-    // Neither the stretch nor the condition number can be left out.
-    assert!(own_offsets(1e3, 1.0, |size| base * size).1 > 50);
-    assert!(own_offsets(1.0, 3000.0, |size| base * size).1 > 5);
+    // Neither the stretch nor the condition number nor the distance can be left out.
+    assert!(own_offsets([1e3, 1.0, 3e3], |e, _| base * e).1 > 50);
+    assert!(own_offsets([1.0, 3000.0, 3.0], |e, _| base * e).1 > 5);
+    assert!(own_offsets([1.0, 1.0, 1e12], |e, _| base * e).1 > 5);
 }
 
 #[test]
