@@ -54,12 +54,13 @@ impl Machine {
         }
     }
 
-    /// Formats everything but the command and the commit, as one line. So many threads built; one traced.
+    /// Formats everything but the command and the commit, as one line. `threads` is the number that built
+    /// trees; one did everything else.
     #[must_use]
     pub fn summary(&self, threads: u32) -> String {
         let threads = match threads {
             0 | 1 => "one thread".to_owned(),
-            threads => format!("builds on {threads} threads, rays on one"),
+            threads => format!("trees built by {threads} threads, all else by one"),
         };
         let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
         let pages = self.large_pages.as_ref().map(|when| format!(", large pages: {when}"));
@@ -135,7 +136,7 @@ mod tests {
         assert!(machine.rustc.starts_with("1.") && machine.date.starts_with("20"), "{machine:?}");
         assert_eq!(machine.date.len(), 10);
         assert!(machine.summary(1).contains("(one thread)"));
-        assert!(machine.summary(2).contains("(builds on 2 threads, rays on one)"));
+        assert!(machine.summary(2).contains("(trees built by 2 threads, all else by one)"));
         let machine = Machine { large_pages: Some("never".to_owned()), ..machine };
         assert!(machine.summary(1).contains(", large pages: never, rustc"));
         let machine = Machine { large_pages: None, ..machine };

@@ -351,7 +351,7 @@ fn numbers(
     }
 }
 
-/// Measures scenes in turn. A scene that fails stops no other: returns their errors as one.
+/// Measures scenes in turn. A scene that fails stops no other. Returns the errors of all that failed as one.
 pub(crate) fn in_turn(
     scenes: &[OsString],
     mut measure: impl FnMut(&OsStr) -> Result<()>,

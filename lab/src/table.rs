@@ -27,15 +27,16 @@ use crate::threads::Threads;
 /// If a scene cannot be loaded or built, or the pictures of two methods differ.
 pub fn run(args: &TableArgs) -> Result<()> {
     let (results, failed) = Results::measure(&args.scenes, &args.race)?;
-    let mut out = io::stdout();
-    if args.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
+    let text = if args.json {
+        serde_json::to_string_pretty(&results)?
     } else if args.markdown {
-        writeln!(out, "{}", results.markdown())?;
+        results.markdown()
     } else {
-        writeln!(out, "{}", results.text())?;
-    }
-    failed.map_or(Ok(()), Err)
+        results.text()
+    };
+    let printed = writeln!(io::stdout(), "{text}");
+    failed.map_or(Ok(()), Err)?;
+    Ok(printed?)
 }
 
 /// Every number of a race over some scenes, with the machine and the settings.
@@ -331,7 +332,7 @@ mod tests {
     fn markdown_is_a_table() {
         let words = "procedural:knot:500 --size 16 --repeat 1 --methods fixed --threads 2";
         let results = results(words).unwrap();
-        assert!(results.text().contains("builds on 2 threads"));
+        assert!(results.text().contains("built by 2 threads"));
         let markdown = results.markdown();
         let table: Vec<_> = markdown.lines().take_while(|line| !line.is_empty()).collect();
         assert!(table.iter().all(|line| line.matches('|').count() == 3), "{markdown}");

@@ -194,7 +194,8 @@ fn pkg_config_finds_the_library_in_the_archive() {
     let printed = output_of(program(&path).env("LD_LIBRARY_PATH", folder.join("lib")));
     assert!(printed.ends_with(HIT), "{printed}");
 
-    // The static library of hgrid alone, as docs/install.md links it: `--static` takes the shared one.
+    // The static library of hgrid alone, as docs/install.md links it: with `--static` alone the linker takes
+    // the shared one.
     let mut ask = without_rust(command("pkg-config"));
     ask.env("PKG_CONFIG_PATH", folder.join("lib/pkgconfig"));
     let libdir = output_of(ask.args(["--variable=libdir", "hgrid"]));

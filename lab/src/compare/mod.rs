@@ -99,8 +99,8 @@ fn measure(args: &CompareArgs, mut systems: Vec<Box<dyn System>>) -> Result<()> 
     let drawn = args.output.as_ref().map_or(Ok(()), |folder| comparison.draw(folder));
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     let printed = writeln!(io::stdout(), "{text}");
-    drawn?;
     failed.map_or(Ok(()), Err)?;
+    drawn?;
     Ok(printed?)
 }
 

@@ -89,7 +89,7 @@ pub struct SystemNumbers {
 pub struct Build {
     /// The median.
     pub seconds: f64,
-    /// The times that it is the median of, one for each repetition.
+    /// The times that it is the median of: one for each repetition, and at least three of first builds.
     pub samples: Vec<f64>,
     /// Pages that were first touched during the build: the median.
     pub page_faults: Option<u64>,
@@ -184,11 +184,11 @@ impl SystemNumbers {
 }
 
 impl Comparison {
-    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the error of the
-    /// others, if there are any. Calls `keep` after each scene with the numbers so far.
+    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the errors of the
+    /// others and of `keep`, if there are any. Calls `keep` after each scene with the numbers so far.
     ///
     /// # Errors
-    /// If no scene can be loaded, and those of [`race`].
+    /// If no scene can be measured.
     pub fn measure(
         scenes: &[OsString],
         systems: &[Box<dyn System>],

@@ -25,7 +25,8 @@ use crate::table::Results;
 /// Measures, draws and writes.
 ///
 /// # Errors
-/// If a scene cannot be loaded or built, or a file cannot be written.
+/// If the scene of figure 1 cannot be loaded or built, or a file cannot be written. If a scene of figure 2 cannot be
+/// loaded or built, after the figure of the others is written.
 pub fn run(args: &FiguresArgs) -> Result<()> {
     scene::check(&args.scenes)?;
     image::in_folder(&args.output, || measure(args))
@@ -44,8 +45,9 @@ fn measure(args: &FiguresArgs) -> Result<()> {
     write(&bars::Figure(&results), &results, folder, "figure2")?;
 
     let names = ["figure1", "figure2"].map(|name| folder.join(name).display().to_string());
-    writeln!(io::stdout(), "wrote {} as .svg, .png and .json", names.join(" and "))?;
-    failed.map_or(Ok(()), Err)
+    let wrote = writeln!(io::stdout(), "wrote {} as .svg, .png and .json", names.join(" and "));
+    failed.map_or(Ok(()), Err)?;
+    Ok(wrote?)
 }
 
 /// Draws figure 1 from the JSON file that the command wrote, as SVG.

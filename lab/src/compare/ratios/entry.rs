@@ -34,7 +34,7 @@ impl<'a> Entry<'a> {
     pub(super) fn image(system: &'a SystemNumbers, kind: Kind) -> Option<Self> {
         let run = system.best(Workload::Primary)?;
         let builds = system.build(kind).samples.iter();
-        // There may be more first builds than repetitions: the last one has them all.
+        // First builds may outnumber the repetitions: the last run stands beside the further ones.
         let runs = run.samples.iter().chain(core::iter::repeat(run.samples.last()?));
         let samples = builds.zip(runs).map(|(build, run)| build + run).collect();
         Some(Self { system, mode: Some(run.mode), value: system.time_to_image(kind)?, samples })
