@@ -65,8 +65,8 @@ pub struct SceneResults {
 }
 
 impl Results {
-    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the error of the
-    /// others, if there are any.
+    /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the errors of
+    /// the others as one, if there are any.
     ///
     /// # Errors
     /// The errors of [`run`], if no scene can be measured.

@@ -52,8 +52,8 @@ fn numbers_that_were_measured_are_kept() {
     let [far, json] = ["far.obj", "kept.json"].map(|name| folder.join(name));
     std::fs::write(&far, "v 900 0 0\nv 901 0 0\nv 900 1 0\nf 1 2 3\n").unwrap();
     let words = format!(
-        "compare procedural:soup:300 {} procedural:knot:500 --eye 0,0,9 --target 0,0,0 --size 16 --repeat 1 --methods bvh \
-         --peers embree-low --workloads primary --json {}",
+        "compare procedural:soup:300 {} procedural:knot:500 --eye 0,0,9 --target 0,0,0 --size 16 \
+         --repeat 1 --methods bvh --peers embree-low --workloads primary --json {}",
         far.display(),
         json.display()
     );

@@ -1,5 +1,5 @@
-//! What a binary with the static library in it contains: as many bytes as docs/embedded.md says, and no exports of
-//! hgrid's with the flag that docs/install.md gives.
+//! Binaries with the static library in them: a program has the size that docs/embedded.md gives, and a shared library
+//! exports none of hgrid's functions if it is linked with the flag of docs/install.md.
 
 use std::fs;
 use std::path::Path;

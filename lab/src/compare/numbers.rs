@@ -185,7 +185,7 @@ impl SystemNumbers {
 
 impl Comparison {
     /// Runs the race on each scene in turn. Returns the numbers of those that can be measured, and the errors of the
-    /// others and of `keep`, if there are any. Calls `keep` after each scene with the numbers so far.
+    /// others and of `keep` as one, if there are any. Calls `keep` after each scene with the numbers so far.
     ///
     /// # Errors
     /// If no scene can be measured.
