@@ -14,13 +14,15 @@ use anyhow::{Context as _, Error, Result, ensure};
 use crate::scene::gltf::files_of;
 use crate::shade::Rgb;
 
-/// Refuses a path where no file can be written. An existing file stays as it is.
+/// Refuses a path where no file can be written. An existing file stays as it is; pipes and devices are not tried.
 ///
 /// # Errors
 /// The errors of opening the file.
 pub fn check_writable(path: &Path) -> Result<()> {
     let attempt = match OpenOptions::new().write(true).create_new(true).open(path) {
         Ok(_) => fs::remove_file(path),
+        // To open a pipe and close it again would tell its reader that nothing comes.
+        Err(error) if error.kind() == ErrorKind::AlreadyExists && is_pipe_or_device(path) => Ok(()),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             OpenOptions::new().write(true).open(path).map(drop)
         }
@@ -30,6 +32,10 @@ pub fn check_writable(path: &Path) -> Result<()> {
         let cause = refusal(path).map_or_else(|| Error::new(error), Error::msg);
         cause.context(format!("cannot write `{}`", path.display()))
     })
+}
+
+fn is_pipe_or_device(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|what| !what.is_file() && !what.is_dir())
 }
 
 /// Refuses to overwrite the file or the two files that a scene is named by, or a buffer that they name, by a blob, a

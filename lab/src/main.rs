@@ -37,15 +37,18 @@ fn main() -> ExitCode {
     }
 }
 
+/// Returns the error of standard output, if it is one: those of files have the names of these around them.
+fn of_output(error: &anyhow::Error) -> Option<&io::Error> {
+    error.chain().next()?.downcast_ref()
+}
+
 /// Returns the message of an error. Files have their names in it, and standard output gets one.
 fn message(error: &anyhow::Error) -> String {
-    let first = error.chain().next().and_then(|first| first.downcast_ref::<io::Error>());
-    let output = first.map_or("", |_| "cannot write to standard output: ");
+    let output = of_output(error).map_or("", |_| "cannot write to standard output: ");
     format!("{output}{error:#}")
 }
 
-/// Returns true if the reader of the output, such as `head`, has closed it.
+/// Returns true if the reader of the output, such as `head`, has closed it. A file that is a pipe is not the output.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>());
-    causes.any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
+    of_output(error).is_some_and(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
 }

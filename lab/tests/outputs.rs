@@ -1,0 +1,61 @@
+//! What the command does when an output takes nothing, takes only a part, or is a pipe.
+
+#![cfg(target_os = "linux")]
+
+use std::fs::{self, File};
+use std::io;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+/// A folder with a mesh in it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> io::Result<Self> {
+        let folder =
+            std::env::temp_dir().join(format!("hgrid-outputs-{name}-{}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        fs::write(folder.join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")?;
+        Ok(Self(folder))
+    }
+
+    /// The command in the folder, with words between spaces.
+    fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+        command.current_dir(&self.0).args(words.split(' '));
+        command
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn error(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A pipe that has a name gets the whole picture, and one that nobody reads to its end is an error.
+#[test]
+fn a_pipe_is_written_once() {
+    let folder = Folder::new("pipe").unwrap();
+    let made = Command::new("mkfifo").current_dir(&folder.0).arg("pipe").status().unwrap();
+    assert!(made.success());
+    let start = |words: &str| {
+        folder.command(words).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let mut child = start("a.obj --size 16 -o pipe");
+    let picture = fs::read(folder.0.join("pipe")).unwrap();
+    if picture.is_empty() {
+        child.kill().unwrap();
+    }
+    assert!(child.wait().unwrap().success() && picture.ends_with(b"IEND\xaeB`\x82"));
+    // The blob is larger than what a pipe holds.
+    let child = start("pack procedural:knot:20K -o pipe");
+    drop(File::open(folder.0.join("pipe")).unwrap());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error(&output).starts_with("error: cannot write `pipe`: "), "{}", error(&output));
+}
