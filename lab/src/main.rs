@@ -8,7 +8,10 @@ use hgrid_lab::cli::{Cli, Command};
 use hgrid_lab::{animate, compare, figures, info, notices, pack, pages, render, table, validate};
 
 fn main() -> ExitCode {
-    let cli = Cli::of_words(env::args_os().skip(1)).unwrap_or_else(|error| error.exit());
+    let cli = match Cli::of_words(env::args_os().skip(1)) {
+        Ok(cli) => cli,
+        Err(error) => return printed(&error),
+    };
     let is_first_try = env::args_os().len() == 1;
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
@@ -34,6 +37,18 @@ fn main() -> ExitCode {
             notices::say(&format!("error: {}", message(&error)));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Prints help, the version or what is wrong with the words, and returns the status.
+fn printed(words: &clap::Error) -> ExitCode {
+    // Not `exit` of the error, which reports success even if there is no room for the help.
+    match words.print().map_err(anyhow::Error::new) {
+        Err(error) if !words.use_stderr() && !is_closed_pipe(&error) => {
+            notices::say(&format!("error: {}", message(&error)));
+            ExitCode::FAILURE
+        }
+        _ => u8::try_from(words.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from),
     }
 }
 

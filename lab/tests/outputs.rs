@@ -33,8 +33,28 @@ impl Drop for Folder {
     }
 }
 
+fn full() -> io::Result<File> {
+    File::options().write(true).open("/dev/full")
+}
+
 fn error(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn help_that_finds_no_room_is_an_error() {
+    let folder = Folder::new("help").unwrap();
+    for words in ["--help", "help render", "--version"] {
+        let output = folder.command(words).stdout(full().unwrap()).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{words}");
+        let said = error(&output);
+        assert!(said.starts_with("error: cannot write to standard output: "), "{words}: {said}");
+    }
+    let output = folder.command("--help").output().unwrap();
+    assert!(output.status.success() && output.stdout.starts_with(b"Ray tracing"));
+    // Errors of words have a status of their own, even if nobody can read them.
+    let output = folder.command("render --no").stderr(full().unwrap()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
 }
 
 /// A pipe that has a name gets the whole picture, and one that nobody reads to its end is an error.
