@@ -26,7 +26,7 @@ use crate::cli::AnimateArgs;
 use crate::field::{self, Field, Memory};
 use crate::image;
 use crate::measure::median;
-use crate::notices::tell;
+use crate::notices::{say, tell};
 use crate::plural::{self, counted};
 use crate::progress::Progress;
 use crate::regions::Regions;
@@ -84,7 +84,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     }
     if let Some(folder) = &args.output {
         let pictures = counted(args.frames, "picture", "pictures");
-        writeln!(io::stderr(), "wrote {pictures} into {}", folder.display())?;
+        say(&format!("wrote {pictures} into {}", folder.display()));
     }
     Ok(())
 }

@@ -57,6 +57,15 @@ fn help_that_finds_no_room_is_an_error() {
     assert_eq!(output.status.code(), Some(2));
 }
 
+#[test]
+fn pictures_are_written_although_nobody_reads_their_number() {
+    let folder = Folder::new("number").unwrap();
+    let words = "animate a.obj --size 16 --frames 1 -o frames";
+    let output = folder.command(words).stderr(full().unwrap()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(folder.0.join("frames/frame-00000.png").exists());
+}
+
 /// A pipe that has a name gets the whole picture, and one that nobody reads to its end is an error.
 #[test]
 fn a_pipe_is_written_once() {
