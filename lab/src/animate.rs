@@ -51,15 +51,15 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let name = args.scene.display();
     ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
     tell(&scene);
-    if let Some(folder) = &args.output {
-        image::make_folder(folder)?;
-    }
     let up = args.picture.up.unwrap_or_else(|| Up::of(&scene));
     let field = Field::new(scene.framed_bounds(), args.instances, up);
     let field = (args.instances > 0).then_some(field);
     let focus = field.map(|field| field.bounds()).or(scene.focus);
     let shown = Scene { focus, is_z_up: Some(up == Up::Z), ..scene.clone() };
     let tiles = args.picture.tiles(&shown)?;
+    if let Some(folder) = &args.output {
+        image::make_folder(folder)?;
+    }
     let config = args.tuning.config(args.method, None);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());

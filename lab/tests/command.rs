@@ -180,6 +180,7 @@ fn an_animation_needs_triangles_and_makes_no_folder_without() {
         ("a.obj --method fixed --refit", "--refit is for --method bvh: ask for that"),
         ("a.obj --refit", "--refit is for later frames than the first: ask for --frames 2"),
         ("a.obj --method fixed --instances 2", "--instances is for --method bvh: ask for that"),
+        ("a.obj --view close", "`a.obj` has no view `close`"),
     ] {
         let said = folder.fails(&format!("animate {words} --frames 1 --size 9 -o frames")).unwrap();
         assert!(said.contains(expected), "{words}: {said}");
