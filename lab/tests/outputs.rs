@@ -88,3 +88,15 @@ fn a_pipe_is_written_once() {
     assert_eq!(output.status.code(), Some(1));
     assert!(error(&output).starts_with("error: cannot write `pipe`: "), "{}", error(&output));
 }
+
+#[test]
+fn figures_that_cannot_be_written_are_not_measured() {
+    let folder = Folder::new("figures").unwrap();
+    fs::create_dir_all(folder.0.join("charts/figure2.json")).unwrap();
+    let words = "figures a.obj --size 9 --repeat 1 --methods fixed --densities 4 -o charts";
+    let output = folder.command(words).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let expected = "error: cannot write `charts/figure2.json`: it is a folder: name a file in it";
+    assert!(error(&output).starts_with(expected), "{}", error(&output));
+    assert!(!folder.0.join("charts/figure1.svg").exists());
+}

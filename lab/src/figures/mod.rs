@@ -35,6 +35,12 @@ pub fn run(args: &FiguresArgs) -> Result<()> {
 /// Measures and draws into the folder, which is there.
 fn measure(args: &FiguresArgs) -> Result<()> {
     let folder = &args.output;
+    // Before the measurement, which takes long.
+    for name in ["figure1", "figure2"] {
+        for ending in ["svg", "png", "json"] {
+            image::check_writable(&folder.join(name).with_extension(ending))?;
+        }
+    }
     let curves = density::Curves::measure(args)?;
     curves.check()?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;
