@@ -23,7 +23,13 @@ pub struct Picture {
     #[arg(long, value_name = "X,Y,Z", conflicts_with = "view", allow_hyphen_values = true)]
     pub eye: Option<Point>,
     /// Look at this point [default: the middle of the scene]
-    #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "eye",
+        conflicts_with = "view",
+        allow_hyphen_values = true
+    )]
     pub target: Option<Point>,
     /// Degrees that the picture covers, from edge to edge, 1 to 120 [default: 40, in a room 70]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
