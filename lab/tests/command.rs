@@ -495,6 +495,7 @@ fn wrong_words_have_a_status_of_their_own_and_change_nothing() {
         ("a.obj -o a.jpg", "pictures are PNG, so name it a.png"),
         ("a.obj --density x --method fixed", "a density is a finite number above 0, like 4 or 0.5"),
         ("a.obj --density 4", "--density is not for bvh"),
+        ("a.obj -o /dev/stdout", "it cannot be standard output: name a file"),
         (
             "a.obj --view front --target 0,0,0",
             "'--view <VIEW>' cannot be used with '--target <X,Y,Z>'",

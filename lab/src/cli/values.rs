@@ -58,7 +58,10 @@ pub(super) fn density(word: &str) -> Result<f32, &'static str> {
 /// Parses the name of a file or a folder to write.
 pub(super) fn output_parser() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path.to_str() {
-        Some("-") => Err("it cannot be standard output: name a file or a folder"),
+        // The numbers go there, too, and would mix with a picture.
+        Some("-" | "/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1") => {
+            Err("it cannot be standard output: name a file or a folder")
+        }
         _ => Ok(path),
     })
 }
