@@ -36,6 +36,10 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let blob = Blob::read(path).with_context(cannot)?;
     let info = BlobInfo::peek(blob.bytes())?;
     if info.content == Content::Packed {
+        ensure!(
+            args.mesh.is_none(),
+            "`{file}` is a packed scene, with its meshes in it: leave out --mesh"
+        );
         return prove_scene(path, &blob, &info);
     }
     let what = match info.content {

@@ -4,8 +4,10 @@
 
 use std::fs::{self, File};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+
+use hgrid_core::{Block, Config, Grid, Instance, Object, Scene, TriangleMesh};
 
 /// A folder with a mesh in it.
 struct Folder(PathBuf);
@@ -99,4 +101,29 @@ fn figures_that_cannot_be_written_are_not_measured() {
     let expected = "error: cannot write `charts/figure2.json`: it is a folder: name a file in it";
     assert!(error(&output).starts_with(expected), "{}", error(&output));
     assert!(!folder.0.join("charts/figure1.svg").exists());
+}
+
+/// Writes a packed scene of two instances of a triangle.
+fn pack_scene(path: &Path) -> Result<(), Box<dyn core::error::Error>> {
+    let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    let config = Config::default();
+    let mut memory = [(); 4].map(|()| vec![Block::ZERO; 64]);
+    let [index, scratch, scene, file] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    let grid = Grid::build(mesh, &config, index, scratch)?;
+    let instances = [Instance::new(0), Instance::new(0)];
+    let objects = [Object::Grid(&grid)];
+    let scene = Scene::build(&instances, &objects, &config, scene, scratch)?;
+    Ok(fs::write(path, scene.pack(file)?)?)
+}
+
+#[test]
+fn a_packed_scene_takes_no_mesh() {
+    let folder = Folder::new("scene").unwrap();
+    pack_scene(&folder.0.join("b.hgrid")).unwrap();
+    let output = folder.command("validate b.hgrid").output().unwrap();
+    assert!(output.status.success(), "{}", error(&output));
+    let output = folder.command("validate b.hgrid --mesh a.obj").output().unwrap();
+    let expected = "error: `b.hgrid` is a packed scene, with its meshes in it: leave out --mesh\n";
+    assert_eq!((output.status.code(), error(&output).as_str()), (Some(1), expected));
 }
