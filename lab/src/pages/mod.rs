@@ -140,7 +140,16 @@ impl Block<'_> {
         let folder = Path::new(self.page).parent().unwrap_or(Path::new(""));
         let path: PathBuf = folder.join(name).with_extension("svg");
         let path = path.to_str().context("a path that is no text")?;
-        files.push(File { name: path.to_owned(), text: svg.to_owned() });
+        let file = File { name: path.to_owned(), text: svg.to_owned() };
+        match files.iter().find(|other| other.name == file.name) {
+            Some(other) => {
+                ensure!(
+                    *other == file,
+                    "`{path}` would have to be two charts: leave one of them out"
+                );
+            }
+            None => files.push(file),
+        }
         Ok(format!("![{name}]({name}.svg)"))
     }
 
@@ -270,6 +279,21 @@ mod tests {
         assert!(fill(&page).unwrap().contains("prose"));
         let error = format!("{:#}", fill(&page.replacen(END, "", 1)).unwrap_err());
         assert!(error.starts_with("no end of `sources lab/results/paper.json`: write"), "{error}");
+    }
+
+    /// Both charts would be one file, and every report would replace one by the other.
+    #[test]
+    fn a_folder_has_one_chart_of_a_kind() {
+        let block = |kind: &str, file: &str| format!("{BEGIN}{kind} {file} -->\n{END}\n");
+        let results = |name: &str| format!("lab/results/2026-11-25_zen5_table_{name}.json");
+        let [bunny, dragon] = ["bunny", "dragon"].map(|name| block("figure2", &results(name)));
+        let mut files = Vec::new();
+        let mut fill = |page: &str, text: &str| fill(&root(), page, text, &mut files);
+        fill("README.md", &bunny).unwrap();
+        fill("docs/a.md", &[&*bunny, &*bunny].concat()).unwrap();
+        let error = format!("{:#}", fill("docs/b.md", &dragon).unwrap_err());
+        assert!(error.contains("`docs/figure2.svg` would have to be two charts"), "{error}");
+        assert_eq!(files.len(), 2);
     }
 
     #[test]
