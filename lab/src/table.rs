@@ -140,6 +140,7 @@ impl Results {
         let expected = merged.scenes.first().map(methods);
         let are_equal = merged.scenes.iter().all(|scene| Some(methods(scene)) == expected);
         ensure!(are_equal, "results of methods that differ");
+        ensure!(expected.is_some_and(|methods| !methods.is_empty()), "results without a method");
         Ok(merged)
     }
 

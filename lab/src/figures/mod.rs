@@ -62,6 +62,7 @@ fn measure(args: &FiguresArgs) -> Result<()> {
 /// If the JSON is not that of figure 1, and those of drawing.
 pub(crate) fn figure1(json: &str) -> Result<String> {
     let curves: density::Curves = serde_json::from_str(json).context("no numbers of figure 1")?;
+    curves.check()?;
     svg(&density::Figure(&curves))
 }
 

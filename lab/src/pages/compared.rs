@@ -69,6 +69,8 @@ struct Ratio {
     most: f64,
 }
 
+const NO_RATIOS: &str = "no ratios: measure with peers beside hgrid";
+
 /// The workloads, in the order of columns.
 const WORKLOADS: [&str; 6] = ["primary", "ao", "bounce", "random", "near", "far"];
 
@@ -109,7 +111,7 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
             rows.push(&ratio.what);
         }
     }
-    ensure!(!rows.is_empty(), "no ratios: measure with peers beside hgrid");
+    ensure!(!rows.is_empty(), NO_RATIOS);
     for row in rows {
         let cells = scenes(files).map(|(_, scene)| {
             let ratio = scene.ratios.iter().find(|ratio| ratio.what == row);
@@ -121,7 +123,11 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
 }
 
 /// Makes a table for each scene: the ratios with their least and most, and the two numbers of each.
-pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
+///
+/// # Errors
+/// If no scene has any.
+pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
+    ensure!(scenes(files).any(|(_, scene)| !scene.ratios.is_empty()), NO_RATIOS);
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
         let mut table = table(&format!("{name}, {}", scene.size()), columns);
@@ -141,11 +147,15 @@ pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
         }
         markdown(&mut table, 1)
     });
-    tables.collect::<Vec<_>>().join("\n\n")
+    Ok(tables.collect::<Vec<_>>().join("\n\n"))
 }
 
 /// Makes a table for each scene: builds, bytes and the fastest mode of every workload, for each structure.
-pub(super) fn systems(files: &[Comparison]) -> String {
+///
+/// # Errors
+/// If there are none.
+pub(super) fn systems(files: &[Comparison]) -> Result<String> {
+    ensure!(scenes(files).any(|(_, scene)| !scene.systems.is_empty()), "no structures");
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["first build", "rebuild", "index", "peak"];
         let columns = columns.into_iter().chain(WORKLOADS).map(str::to_owned);
@@ -164,7 +174,7 @@ pub(super) fn systems(files: &[Comparison]) -> String {
         }
         markdown(&mut table, 1)
     });
-    tables.collect::<Vec<_>>().join("\n\n")
+    Ok(tables.collect::<Vec<_>>().join("\n\n"))
 }
 
 impl System {

@@ -117,8 +117,8 @@ impl Block<'_> {
         ensure!(!names.is_empty(), "no files");
         match *kind {
             "ratios" => compared::ratios(&self.read(names)?),
-            "ratios-in-full" => Ok(compared::ratios_in_full(&self.read(names)?)),
-            "systems" => Ok(compared::systems(&self.read(names)?)),
+            "ratios-in-full" => compared::ratios_in_full(&self.read(names)?),
+            "systems" => compared::systems(&self.read(names)?),
             "table1" => Ok(Results::merged(self.read(names)?)?.markdown_table()),
             "beside-the-paper" => {
                 let [paper, names @ ..] = names else { bail!("no files") };
@@ -294,6 +294,35 @@ mod tests {
         let error = format!("{:#}", fill("docs/b.md", &dragon).unwrap_err());
         assert!(error.contains("`docs/figure2.svg` would have to be two charts"), "{error}");
         assert_eq!(files.len(), 2);
+    }
+
+    #[test]
+    fn results_that_show_nothing_are_refused() {
+        let folder = std::env::temp_dir().join(format!("hgrid-nothing-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let empty = |name: &str, list: &str| {
+            let text = fs::read_to_string(root().join("lab/results").join(name)).unwrap();
+            let mut result: serde_json::Value = serde_json::from_str(&text).unwrap();
+            result[list] = serde_json::Value::Array(Vec::new());
+            fs::write(folder.join("a.json"), result.to_string()).unwrap();
+        };
+        let error = |kind: &str| {
+            let page = format!("{BEGIN}{kind} a.json -->\n{END}\n");
+            format!("{:#}", fill(&folder, "a.md", &page, &mut Vec::new()).unwrap_err())
+        };
+        empty("2026-11-28d_zen4_spheres.json", "scenes");
+        for (kind, expected) in
+            [("ratios", "no ratios"), ("ratios-in-full", "no ratios"), ("systems", "no structures")]
+        {
+            assert!(error(kind).contains(expected), "{kind}: {}", error(kind));
+        }
+        empty("2026-11-25_zen5_table_bunny.json", "scenes");
+        for kind in ["table1", "figure2"] {
+            assert!(error(kind).contains("results without a method"), "{}", error(kind));
+        }
+        empty("2026-11-25_zen5_figure1.json", "methods");
+        assert!(error("figure1").contains("figure 1 would show nothing"), "{}", error("figure1"));
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

@@ -52,6 +52,17 @@ impl Paper {
             self.scenes.len(),
             results.scenes.len()
         );
+        ensure!(!self.methods.is_empty(), "the paper has no methods");
+        for paper in &self.methods {
+            for (name, theirs, ..) in ROWS {
+                let (method, count) = (&paper.method, theirs(paper).len());
+                ensure!(
+                    count == self.scenes.len(),
+                    "the paper has {count} numbers of `{name}` by `{method}` for {} scenes",
+                    self.scenes.len()
+                );
+            }
+        }
         let mut table = Table::new();
         let columns = results.scenes.iter().zip(&self.scenes).map(|(scene, paper)| {
             let (name, count) = (display_name(&scene.facts.scene), count(scene.facts.triangles));
@@ -75,5 +86,31 @@ impl Paper {
             }
         }
         Ok(markdown(&mut table, 2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_number_that_is_missing_is_named() {
+        let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("results");
+        let text = |name: &str| fs::read_to_string(results.join(name)).unwrap();
+        let mut paper: Paper = serde_json::from_str(&text("paper.json")).unwrap();
+        let race: Results =
+            serde_json::from_str(&text("2026-11-25_zen5_table_bunny.json")).unwrap();
+        let results = Results::merged(vec![race; paper.scenes.len()]).unwrap();
+        paper.beside(&results).unwrap();
+        paper.methods[1].build_seconds.pop();
+        let error = paper.beside(&results).unwrap_err().to_string();
+        let expected = "the paper has 4 numbers of `build (s)` by `variable` for 5 scenes";
+        assert_eq!(error, expected);
+        paper.methods.clear();
+        let error = paper.beside(&results).unwrap_err().to_string();
+        assert_eq!(error, "the paper has no methods");
     }
 }
