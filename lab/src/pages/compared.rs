@@ -182,7 +182,7 @@ impl System {
     fn fastest(&self, workload: &str) -> String {
         let runs = self.runs.iter().filter(|run| run.workload == workload);
         // The rule of the ratios: at most one answer in a thousand may differ.
-        let right = runs.filter(|run| run.differing * 1000 <= run.rays);
+        let right = runs.filter(|run| run.differing <= run.rays / 1000);
         let fastest = right.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
         fastest.map_or_else(String::new, |run| {
             format!("{} {}", nanoseconds(run.seconds, run.rays), run.mode)
@@ -244,6 +244,28 @@ mod tests {
         assert!(table.contains("| build ") && table.contains("| rays "), "{table}");
         let error = ratios(&[file("hgrid compare", &[("a", &[])])]).unwrap_err().to_string();
         assert!(error.contains("no ratios"), "{error}");
+    }
+
+    #[test]
+    fn a_mode_with_wrong_answers_is_not_the_fastest() {
+        let run = |mode: &str, seconds: f64, differing: u64| Run {
+            workload: "primary".to_owned(),
+            mode: mode.to_owned(),
+            seconds,
+            rays: 2999,
+            differing,
+        };
+        let build = Build { seconds: 1.0 };
+        let system = System {
+            system: "bvh".to_owned(),
+            is_peer: false,
+            first_build: build.clone(),
+            rebuild: build,
+            index_bytes: 1,
+            peak_bytes: 1,
+            runs: vec![run("slow", 2.999, 2), run("wrong", 1.0, 3), run("damaged", 0.1, u64::MAX)],
+        };
+        assert_eq!(system.fastest("primary"), "1000000 slow");
     }
 
     #[test]

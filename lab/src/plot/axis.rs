@@ -69,7 +69,7 @@ impl Scale {
             // Not the logarithm of a quotient, which may be infinite.
             (amount.max(start).ln() - start.ln()) / (end.ln() - start.ln())
         } else {
-            (amount - start) / (end - start)
+            (amount.max(start) - start) / (end - start)
         }
     }
 }
@@ -212,6 +212,13 @@ mod tests {
             assert!(0.0 <= low && low <= high && 0.25 < high && high <= 1.0, "{low} to {high}");
             assert!(scale.labelled.len() < 2000, "{amounts:?}");
         }
+    }
+
+    /// A damaged result may have any of them.
+    #[test]
+    fn amounts_below_zero_are_at_the_start() {
+        let scale = Scale::fitting([2.0, 3.0].into_iter(), 0.1);
+        assert_eq!([-1.0, -1e308].map(|amount| scale.map(&amount, (100, 0))), [100, 100]);
     }
 
     #[test]
