@@ -80,10 +80,11 @@ fn write(
     folder: &Path,
     name: &str,
 ) -> Result<()> {
-    save(drawing, folder, name)?;
+    // The numbers first: they took long, and pictures can be drawn from them again.
     let path = folder.join(name).with_extension("json");
     let json = serde_json::to_string_pretty(numbers)? + "\n";
-    fs::write(&path, json).with_context(|| format!("cannot write `{}`", path.display()))
+    fs::write(&path, json).with_context(|| format!("cannot write `{}`", path.display()))?;
+    save(drawing, folder, name)
 }
 
 /// Returns the colour of a method, the same in every picture.
@@ -115,6 +116,21 @@ mod tests {
                 serde_json::from_str::<serde_json::Value>(&json).unwrap()["machine"].is_object()
             );
         }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_numbers_are_there_if_a_picture_does_not_fit() {
+        let folder = std::env::temp_dir().join(format!("hgrid-full-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        std::os::unix::fs::symlink("/dev/full", folder.join("figure1.png")).unwrap();
+        let words = "hgrid procedural:knot:800 --size 16 --repeat 1 --densities 1,8 -o";
+        let words = words.split_whitespace().map(Into::into).chain([folder.clone().into()]);
+        let error = run(&FiguresArgs::parse_from::<_, std::ffi::OsString>(words)).unwrap_err();
+        assert!(format!("{error:#}").contains("figure1.png"), "{error:#}");
+        let json = fs::read_to_string(folder.join("figure1.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&json).unwrap();
         fs::remove_dir_all(&folder).unwrap();
     }
 
