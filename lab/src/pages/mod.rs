@@ -95,7 +95,7 @@ fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<St
             behind.split_once(END).with_context(|| format!("no end of `{words}`"))?;
         // The text up to the end of another block is not old: people wrote it.
         ensure!(!old.contains(BEGIN), "no end of `{words}`: write `{END}` below its table");
-        let block = Block { root, page, words: words.split(' ').collect() };
+        let block = Block { root, page, words: words.split_whitespace().collect() };
         let made = block.make(files).with_context(|| format!("`{words}`"))?;
         write!(filled, "{before}{BEGIN}{words} -->\n{made}\n{END}")?;
         rest = behind;
@@ -333,6 +333,7 @@ mod tests {
             (format!("{BEGIN}ratios a.json -->\n"), "no end"),
             (format!("{BEGIN}ratios a.json -->\n{END}"), "a.json"),
             (format!("{BEGIN}ratios -->\n{END}"), "no files"),
+            (format!("{BEGIN}ratios  -->\n{END}"), "no files"),
             (format!("{BEGIN}ratios README.md -->\n{END}"), "README.md"),
         ] {
             let error = fill(&root(), "docs/page.md", &text, &mut Vec::new()).unwrap_err();
