@@ -86,7 +86,7 @@ impl PackArgs {
                     "`{name}` is no name in C: take letters, digits and _"
                 );
                 let is_free = !is_reserved(name);
-                ensure!(is_free, "`{name}` has a meaning in C or C++: take another name");
+                ensure!(is_free, "`{name}` has a meaning in C, C++ or hgrid.h: take another name");
             }
         }
         Ok(())
@@ -98,7 +98,8 @@ fn is_identifier(name: &str) -> bool {
     is_word && name.bytes().next().is_some_and(|first| !first.is_ascii_digit())
 }
 
-/// The words of C and C++ that can be no names, and the function that every program has.
+/// The words of C and C++ that can be no names, the function that every program has, and macros that compilers or
+/// stdint.h define.
 const RESERVED: &str = "\
     _Alignas _Alignof _Atomic _BitInt _Bool _Complex _Decimal128 _Decimal32 _Decimal64 _Generic _Imaginary \
     _Noreturn _Static_assert _Thread_local alignas alignof and and_eq asm auto bitand bitor bool break case \
@@ -108,10 +109,12 @@ const RESERVED: &str = "\
     not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires restrict \
     return short signed sizeof static static_assert static_cast struct switch template this thread_local \
     throw true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile \
-    wchar_t while xor xor_eq";
+    wchar_t while xor xor_eq NULL linux unix";
 
+/// Returns true for words of the language, and for names that hgrid.h or the system has or may have one day.
 fn is_reserved(name: &str) -> bool {
-    RESERVED.split(' ').any(|word| word == name)
+    let is_of_header = ["hgrid_", "HGRID_"].iter().any(|start| name.starts_with(start));
+    is_of_header || name.ends_with("_t") || RESERVED.split(' ').any(|word| word == name)
 }
 
 /// The arguments of `hgrid validate`.
