@@ -165,6 +165,9 @@ mod tests {
         // Bins that are cut into several roots have fewer to spare.
         assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
         assert_eq!(units(&[crowd, per_root, crowd]).len(), 3);
+        // One triangle more than a single root takes makes four, which leave less for small bins.
+        assert_eq!(units(&[MOST_ROOT as u32, 1, 1, per_root]).len(), 4);
+        assert_eq!(units(&[MOST_ROOT as u32 + 1, 1, 1, per_root]).len(), 3);
         // Crowded bins come first, and the small rest is a unit of its own.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
