@@ -87,4 +87,15 @@ mod tests {
         assert_eq!(bump.offset(), Ok(12));
         assert_eq!(words, [1, 1, 1, 1, 2, 2, 2, 7, 7, 7]);
     }
+
+    #[test]
+    fn a_place_never_has_the_bit_of_a_grid() {
+        let mut bump = Bump::over(&mut []);
+        assert!(bump.take(GRID as usize - 1).is_none());
+        assert_eq!(bump.offset(), Ok(GRID - 1));
+        for count in [1, GRID as usize] {
+            assert!(bump.take(count).is_none());
+            assert_eq!(bump.offset(), Err(Error::InvalidConfig(ConfigField::Density)));
+        }
+    }
 }
