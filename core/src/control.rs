@@ -154,3 +154,31 @@ impl<'c> Watch<'c> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+    use core::cell::RefCell;
+
+    use super::*;
+
+    #[test]
+    fn one_is_reported_once_and_at_the_end() {
+        let seen = RefCell::new(Vec::new());
+        let progress = |done: f32| {
+            seen.borrow_mut().push(done);
+            // A build whose last part is done cannot be cancelled.
+            done < 1.0
+        };
+        let control = Control { progress: Some(&progress), ..Control::SERIAL };
+        let watch = Watch::new(&control);
+        // Places up to the end, and a part without places.
+        for (place, count, part) in
+            [(0, 0, [0.25, 0.5]), (1, 2, [0.5, 1.0]), (2, 2, [0.5, 1.0]), (3, 2, [0.5, 1.0])]
+        {
+            assert_eq!(watch.between(place, count, part), Ok(()));
+        }
+        watch.end();
+        assert_eq!(seen.into_inner(), [0.25, 0.75, 1.0]);
+    }
+}
