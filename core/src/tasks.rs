@@ -175,3 +175,64 @@ impl<'w> Shared<'w> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn the_number_of_tasks_is_clamped() {
+        let count = |tasks, most| task_count(&Control { tasks, ..Control::SERIAL }, most) as usize;
+        assert_eq!([count(0, 9), count(9, 0), count(1, 9)], [1; 3]);
+        assert_eq!([count(9, 3), count(3, 9)], [3.min(MOST); 2]);
+        assert_eq!([count(65, 99), count(u32::MAX, usize::MAX)], [MOST; 2]);
+    }
+
+    /// Runs three tasks by a loop, and takes the results up to an error at one of them.
+    fn taken(
+        calls: impl Fn(u32, &dyn Fn(u32)),
+        error_at: Option<u32>,
+    ) -> (Vec<u32>, Result<(), Error>) {
+        let mut results = Vec::new();
+        let run_all = |count: u32, task: &(dyn Fn(u32) + Sync)| calls(count, &task);
+        let control = Control { tasks: 3, run: &run_all, progress: None };
+        let outcome = run(
+            &control,
+            [1, 2, 3].into_iter(),
+            |task| 10 * task,
+            |result| {
+                results.push(result);
+                if error_at == Some(result) { Err(Error::MeshMismatch) } else { Ok(()) }
+            },
+        );
+        (results, outcome)
+    }
+
+    #[test]
+    fn the_first_error_of_a_result_is_the_last_word() {
+        if MOST < 3 {
+            return;
+        }
+        let forwards = |count, task: &dyn Fn(u32)| (0..count).for_each(task);
+        assert_eq!(taken(forwards, None), (Vec::from([10, 20, 30]), Ok(())));
+        for (at, expected) in [(10, &[10][..]), (20, &[10, 20]), (30, &[10, 20, 30])] {
+            let (results, outcome) = taken(forwards, Some(at));
+            assert_eq!((&results[..], outcome), (expected, Err(Error::MeshMismatch)));
+        }
+    }
+
+    #[test]
+    fn a_loop_that_does_not_run_each_task_once_is_found_out() {
+        if MOST < 3 {
+            return;
+        }
+        for calls in [&[0, 1][..], &[], &[0, 2, 1, 1], &[0, 1, 2, 3], &[u32::MAX, 0, 1, 2]] {
+            let (_, outcome) = taken(|_, task| calls.iter().for_each(|&at| task(at)), None);
+            assert_eq!(outcome, Err(Error::InvalidParallelFor), "{calls:?}");
+        }
+        let backwards = taken(|count, task| (0..count).rev().for_each(task), None);
+        assert_eq!(backwards, (Vec::from([10, 20, 30]), Ok(())));
+    }
+}
