@@ -386,6 +386,32 @@ fn an_answer_outside_the_range_is_no_hit() {
 }
 
 #[test]
+fn a_test_is_told_the_closest_hit_so_far_and_of_equal_hits_the_first_shape_wins() {
+    // Boxes that begin before or behind one another, and all reach beyond the hits.
+    for towards in [0.01, -0.01] {
+        let boxes: Vec<_> =
+            (0..40_u8).map(|id| [0.0, 0.0, towards * f32::from(id), 1.0, 1.0, 5.0]).collect();
+        let view = Boxes::new(&boxes).unwrap();
+        let built = Built::shapes(view, &Config::default()).unwrap();
+        let shapes = Shapes::open(built.bytes(), view).unwrap();
+        for step in [0.0, 0.01] {
+            let (mut closest, mut calls) = (f32::INFINITY, 0);
+            let mut test = |id: u32, ray: &Ray| {
+                assert_eq!(ray.t_max.to_bits(), closest.to_bits(), "shape {id}");
+                let t = 4.0 + step * (id % 7 * 3 % 7) as f32;
+                closest = closest.min(t);
+                calls += 1;
+                Some(ShapeHit { t, u: 0.0, v: 0.0 })
+            };
+            let ray = Ray::new([0.5, 0.5, -1.0], [0.0, 0.0, 1.0]);
+            let hit = shapes.intersect(&ray, &mut test).map(|hit| (hit.t, hit.primitive));
+            assert_eq!(hit, Some((4.0, 0)));
+            assert_eq!(calls, 40);
+        }
+    }
+}
+
+#[test]
 fn moved_shapes_are_found_after_a_refit() {
     let all = spheres(700, 0.05, 9);
     let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
