@@ -1,6 +1,6 @@
 //! Trees: nodes with quantised boxes, and leaves that hold each triangle once.
 
-use hgrid_core::{Config, Error, Grid, Method};
+use hgrid_core::{Config, Error, Grid, Method, refit};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays};
 use hgrid_tests::meshes::{Mesh, ball, room, soup};
@@ -413,6 +413,74 @@ fn circles_end() {
         let grid = Grid::open(copy.bytes(), view).unwrap();
         ends(&grid, &fixed_rays(grid.bounds(), 40));
         assert!(matches!(prove(&grid), Err(Error::Corrupt { .. })));
+    }
+}
+
+/// A refit follows the nodes, too: it finds where they lead astray before it writes.
+#[test]
+fn a_refit_of_nodes_that_lead_astray_is_refused() {
+    let seed = deep();
+    let t = Tree::of(&seed.blob);
+    let below = |node: usize| {
+        let children = t.children(&seed.blob, node).into_iter();
+        children.filter_map(
+            |(_, child)| if let Child::Node(child) = child { Some(child) } else { None },
+        )
+    };
+    let size = |node: usize| {
+        let (mut count, mut rest) = (0, vec![node]);
+        while let Some(node) = rest.pop() {
+            count += 1;
+            rest.extend(below(node));
+        }
+        count
+    };
+    let small = below(0).min_by_key(|&node| size(node)).expect("nodes below the root");
+    let large = below(0).max_by_key(|&node| size(node)).expect("nodes below the root");
+    assert!(size(small) < size(large));
+    let way = t.deepest(&seed.blob);
+    let &[.., (above, _), (last, leaf)] = &way[..] else { panic!("no deep tree") };
+    let inner = |node: usize| seed.blob[t.at(node, INNER)];
+    let highest = 7 - inner(above).leading_zeros() as usize;
+    let count = NODE_COUNT..NODE_COUNT + 4;
+    let cases = [
+        case("a node that none leads to", count, |b| {
+            b.set(t.at(above, INNER), &[inner(above) & !(1 << highest)]);
+        }),
+        case("a leaf of too many", t.node(last), |b| b.set(t.at(last, COUNTS + leaf), &[9])),
+        case("a leaf behind the ids", t.node(last), |b| {
+            b.set_word(t.at(last, FIRST), t.id_count as u32);
+        }),
+        case("a node behind the last one", 0..usize::MAX, |b| {
+            b.set_word(t.at(0, CHILD), t.node_count as u32);
+        }),
+        case("a circle", t.all(), |b| b.set_word(t.at(above, CHILD), 0)),
+        case("nodes that are met twice", t.all(), |b| {
+            b.set(t.at(small, 0), &seed.blob[t.node(large)]);
+        }),
+    ];
+    not_refitted(&seed, &cases);
+
+    let seed = Seed::new(room(), Config::new(Method::Bvh));
+    let t = Tree::of(&seed.blob);
+    let fine = t.at(t.node_count, 0).next_multiple_of(64);
+    let cases = [case("sides of another node", t.node(0), |b| add(b, fine + OWNER, 1))];
+    not_refitted(&seed, &cases);
+}
+
+/// Changes a blob, corrects its checksum, and asserts that a refit refuses it at the right offset and leaves it alone.
+fn not_refitted(seed: &Seed, cases: &[Case<'_>]) {
+    for (what, at, change) in cases {
+        let mut copy = Copy::of(&seed.blob);
+        change(&mut copy);
+        copy.sign();
+        let before = copy.bytes().to_vec();
+        assert!(before != seed.blob, "{what}: nothing has changed");
+        let result = refit(copy.bytes_mut(), &seed.mesh.view());
+        let is_there = matches!(result, Err(Error::Corrupt { offset })
+            if usize::try_from(offset).is_ok_and(|offset| at.contains(&offset)));
+        assert!(is_there, "{what}: {result:?}, expected at {at:?}");
+        assert!(copy.bytes() == before, "{what}: bytes have changed");
     }
 }
 
