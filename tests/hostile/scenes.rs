@@ -188,6 +188,36 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
     );
 }
 
+/// Offset of the bytes of the tree in a header.
+const BLOB_BYTES: usize = 16;
+
+/// Returns the place of the table in the blob of a scene: behind its tree.
+fn table_of(blob: &[u8]) -> usize {
+    let bytes: [u8; 8] = blob[BLOB_BYTES..][..8].try_into().unwrap();
+    (u64::from_ne_bytes(bytes) as usize).next_multiple_of(64)
+}
+
+#[test]
+fn a_table_says_how_many_objects_instances_name_and_nothing_else() {
+    let mesh = ball(1, 1.0);
+    let owned = Owned::build(&mesh.view(), &Config::default()).unwrap();
+    let grid: Grid<'_> = owned.open(&mesh.view()).unwrap();
+    let objects = [Object::Grid(&grid), Object::Grid(&grid), Object::Nothing];
+    let built = Built::scene(&[Instance::new(1)], &objects, &Config::default()).unwrap();
+    let table = table_of(built.bytes());
+    let proven = |at: usize, word: u32| {
+        let mut copy = Copy::of(built.bytes());
+        copy.set_word(table + at, word);
+        let scene = Scene::open(copy.bytes(), &objects).unwrap();
+        scene.validate(&mut vec![0; scene.validate_bytes()])
+    };
+    let damaged = Err(hgrid_core::Error::Corrupt { offset: table as u64 });
+    assert_eq!(proven(0, 2), Ok(()));
+    for (at, word) in [(0, 0), (0, 1), (0, 3), (4, 1), (60, 1)] {
+        assert_eq!(proven(at, word), damaged, "{at} {word}");
+    }
+}
+
 #[test]
 fn a_packed_scene_refers_to_what_lies_before() {
     let mesh = ball(1, 1.0);
@@ -198,7 +228,8 @@ fn a_packed_scene_refers_to_what_lies_before() {
     let inner = inner.open(&grids).unwrap();
     let objects = [Object::Scene(&inner)];
     let built = Built::scene(&[Instance::new(0)], &objects, &Config::default()).unwrap();
-    let file = packed(&built.open(&objects).unwrap()).unwrap();
+    let scene = built.open(&objects).unwrap();
+    let file = packed(&scene).unwrap();
     let bytes = Block::bytes(&file);
     prove_packed(bytes).unwrap();
     // The inner scene shows member 0, the outer one member 1; after these references there is only padding.
@@ -215,6 +246,18 @@ fn a_packed_scene_refers_to_what_lies_before() {
         (damaged, damaged, damaged, damaged)
     );
     assert_eq!(with(136, 1), damaged);
+    // Bytes behind the last scene, which the header counts.
+    let mut copy = Copy::of(&[bytes, &[0; 64]].concat());
+    copy.set(BLOB_BYTES, &(bytes.len() as u64 + 64).to_ne_bytes());
+    copy.sign();
+    assert_eq!(with_packed(copy.bytes(), |opened| opened.map(|_| ())), damaged);
+    // The place of an error in a member is one of the whole: here in the table of the inner scene.
+    let table = table_of(inner.blob()) as u64;
+    let inside = bytes.len() - scene.blob().len() - inner.blob().len();
+    let mut copy = Copy::of(bytes);
+    copy.set_word(inside + table as usize + 4, 1);
+    let offset = inside as u64 + table;
+    assert_eq!(prove_packed(copy.bytes()), Err(hgrid_core::Error::Corrupt { offset }));
     // The outer scene may show the grid in place of the inner scene; only the proof finds that.
     assert_eq!(with(132, 0), Ok(()));
     let mut copy = Copy::of(bytes);
