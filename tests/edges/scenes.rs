@@ -278,8 +278,12 @@ fn boxes_that_are_none_leave_their_shapes_out() {
     let strict = Config { flags: BuildFlags::STRICT, ..Config::default() };
     let error = Built::shapes(view, &strict).unwrap_err();
     assert_eq!(error, Error::NonFiniteTriangle { triangle: 0 });
-    let error = Shapes::sizes(&view, &Config::new(Method::OneLevel), &mut []).unwrap_err();
+    let grid = Config::new(Method::OneLevel);
+    let error = Shapes::sizes(&view, &grid, &mut []).unwrap_err();
     assert_eq!(error, Error::InvalidConfig(ConfigField::Method));
+    let error = Shapes::build(view, &grid, &mut [], &mut []).unwrap_err();
+    assert_eq!(error, Error::InvalidConfig(ConfigField::Method));
+    assert_eq!(Scene::bound(7, &grid), None);
     let short = Strided { bytes: &[0; 47], stride: 24, count: 2 };
     assert!(Boxes::strided(short).is_err());
     let narrow = Strided { bytes: &[0; 48], stride: 23, count: 2 };
@@ -294,6 +298,9 @@ fn a_refit_of_other_instances_is_refused() {
         let before = built.bytes().to_vec();
         let fewer = Scene::refit(built.bytes_mut(), &instances[1..], objects).unwrap_err();
         assert_eq!(fewer, Error::MeshMismatch);
+        let more = [&instances[..], &instances[..1]].concat();
+        let more = Scene::refit(built.bytes_mut(), &more, objects).unwrap_err();
+        assert_eq!(more, Error::MeshMismatch);
         let none = Scene::refit(built.bytes_mut(), &instances, &[]).unwrap_err();
         assert_eq!(none, Error::MissingObjects { needed: 1, available: 0 });
         assert!(built.bytes() == before);
@@ -344,6 +351,12 @@ fn packed_scenes_are_refused_for_what_they_are() {
         open(3, 9).unwrap();
         assert_eq!(open(0, 4), Err(Error::MissingObjects { needed: 1, available: 0 }));
         assert_eq!(open(1, 3), Err(Error::MissingObjects { needed: 4, available: 3 }));
+
+        // Room that is not aligned.
+        let mut room = vec![Block::ZERO; file.len() + 1];
+        let error = scene.pack(&mut Block::bytes_mut(&mut room)[1..]).unwrap_err();
+        assert_eq!(error, Error::Misaligned { region: Region::Index });
+        assert!(Block::bytes(&room).iter().all(|&byte| byte == 0), "something was written");
 
         // Too little scratch.
         let (mut members, mut places) = ([Member::EMPTY; 1], [Object::Nothing; 4]);
