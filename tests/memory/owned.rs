@@ -35,6 +35,11 @@ thread_local! {
     static HEAP: Cell<Heap> = const { Cell::new(UNLIMITED) };
 }
 
+thread_local! {
+    /// True if `realloc` moves the bytes to an address that is elsewhere between two multiples of [`ALIGNMENT`].
+    static MOVES: Cell<bool> = const { Cell::new(false) };
+}
+
 /// The alignment up to which `calloc` and `realloc` need not touch the bytes.
 const USUAL_ALIGNMENT: usize = 16;
 
@@ -85,6 +90,10 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn realloc(&self, start: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
         give(layout.size());
         add(bytes, layout.align() > USUAL_ALIGNMENT);
+        if MOVES.get() {
+            // SAFETY: as above, for a block of this allocator.
+            return unsafe { move_elsewhere(start, layout, bytes, 64) };
+        }
         // SAFETY: as above, for a block of this allocator.
         unsafe { System.realloc(start, layout, bytes) }
     }
@@ -94,6 +103,39 @@ unsafe impl GlobalAlloc for Counting {
         // SAFETY: as above, for a block of this allocator.
         unsafe { System.dealloc(start, layout) }
     }
+}
+
+/// Moves a block to an address that is elsewhere between two multiples of [`ALIGNMENT`], or after so many tries to any.
+///
+/// # Safety
+/// As for [`GlobalAlloc::realloc`].
+unsafe fn move_elsewhere(start: *mut u8, layout: Layout, bytes: usize, tries: u32) -> *mut u8 {
+    let new = Layout::from_size_align(bytes, layout.align()).unwrap();
+    // SAFETY: the caller promises that the size is not zero.
+    let block = unsafe { System.alloc(new) };
+    if block.is_null() {
+        return block;
+    }
+    if block.addr() % ALIGNMENT != start.addr() % ALIGNMENT || tries == 0 {
+        // SAFETY: both blocks have so many bytes, and one of them is new.
+        unsafe { block.copy_from_nonoverlapping(start, bytes.min(layout.size())) };
+        // SAFETY: the caller gives this block away.
+        unsafe { System.dealloc(start, layout) };
+        return block;
+    }
+    // Keep the block while others are tried, and a small one before them.
+    let small = Layout::new::<u64>();
+    // SAFETY: the size is not zero.
+    let between = unsafe { System.alloc(small) };
+    // SAFETY: as this call.
+    let moved = unsafe { move_elsewhere(start, layout, bytes, tries - 1) };
+    // SAFETY: allocated above.
+    unsafe { System.dealloc(block, new) };
+    if !between.is_null() {
+        // SAFETY: allocated above.
+        unsafe { System.dealloc(between, small) };
+    }
+    moved
 }
 
 fn scene() -> Mesh {
@@ -141,6 +183,24 @@ fn a_grid_keeps_what_it_takes_and_nothing_is_written_but_by_the_build() {
         drop(grid);
         let left = HEAP.get().current.wrapping_sub(before.current).cast_signed();
         assert!(left < 0, "the grid and its mesh were not freed: {left} bytes");
+    }
+}
+
+/// An allocator may move what shrinks, to an address that is aligned otherwise.
+#[test]
+fn a_grid_that_moves_while_it_shrinks_is_whole() {
+    let mesh = ball(6, 1.0);
+    for config in methods::configs() {
+        let plain = Owned::build(&mesh.view(), &config).unwrap();
+        MOVES.set(true);
+        let built = OwnedGrid::build(owned(&mesh), &config).unwrap();
+        // Bytes behind the blob are given back.
+        let opened = OwnedGrid::open(&[plain.bytes(), &[7; 500]].concat(), owned(&mesh)).unwrap();
+        MOVES.set(false);
+        for grid in [built, opened] {
+            assert!(grid.grid().blob() == plain.bytes(), "{:?}", config.method());
+            prove(&grid.grid()).unwrap();
+        }
     }
 }
 
@@ -229,6 +289,9 @@ fn vertices_in_structs_small_indices_and_masks() {
     let grid = OwnedGrid::build(input.clone(), &Config::default()).unwrap();
     assert_eq!(grid.grid().blob(), Owned::build(&mesh.view(), &Config::default()).unwrap().bytes());
     check(&grid.grid());
+    // A field of a field: offsets add up.
+    let within = OwnedStrided::new(vertices.clone()).at(4).at(8);
+    assert_eq!(within.view().bytes.len(), vertices.len() * size_of::<Vertex>() - 12);
     // A field offset past the end of the struct is refused.
     assert!(strided(12).is_ok() && strided(13).is_err() && strided(usize::MAX).is_err());
 
