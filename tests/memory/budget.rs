@@ -4,6 +4,21 @@ use hgrid_core::{Block, Config, Error, Grid, Method, Region, fit, sizes};
 use hgrid_tests::meshes::{Mesh, ball};
 use hgrid_tests::methods::configs;
 
+/// The configuration whose grid has one step more cells than this one; none for the finest.
+fn a_step_finer(finest: &Config, fitted: &Config) -> Option<Config> {
+    let density = finest.parameters.density()?;
+    let (mut fewer, mut finer) = (1.0, None);
+    while fewer > 0.0 {
+        let coarser = (f64::from(density) * fewer) as f32;
+        if fitted.parameters.density() == Some(coarser) {
+            return finer;
+        }
+        finer = Some(Config { parameters: finest.parameters.with_density(coarser), ..*finest });
+        fewer *= std::f64::consts::FRAC_1_SQRT_2;
+    }
+    panic!("{fitted:?} is no coarser {finest:?}");
+}
+
 #[test]
 fn the_finest_grid_that_fits_is_built_in_its_budget() {
     let mesh = ball(40, 1.0);
@@ -31,6 +46,11 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
                 }
             };
             assert_eq!(sizes(&view, &fitted, scratch), Ok(needed));
+            if let Some(finer) = a_step_finer(&config, &fitted) {
+                let finer = sizes(&view, &finer, scratch).ok().map(|finer| finer.index_bytes);
+                let most = budget.max(needed.index_bytes);
+                assert!(finer.is_none_or(|bytes| bytes > most), "{fitted:?} in {most} bytes");
+            }
             assert!(has_dial || fitted == config && needed.index_bytes == whole);
             assert!(
                 needed.index_bytes <= last.min(budget.max(needed.index_bytes)),
@@ -62,6 +82,9 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         let (fitted, needed) = fit(&view, &finer, budget, scratch).unwrap();
         assert!(needed.index_bytes <= budget, "{config:?}");
         assert!(fitted.parameters.density() < Some(1e9), "{fitted:?}");
+        let finer = a_step_finer(&finer, &fitted).expect("a coarser one fits");
+        let finer = sizes(&view, &finer, scratch).ok().map(|finer| finer.index_bytes);
+        assert!(finer.is_none_or(|bytes| bytes > budget), "{fitted:?} in {budget} bytes");
     }
     let nothing = Mesh::default();
     for config in configs() {
