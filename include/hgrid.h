@@ -1827,6 +1827,9 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * fits or does not. The call does the work of `hgrid_sizes` about a dozen times, and at most 22 times. A density that
  * is too fine for a build counts as one that does not fit.
  *
+ * The search relies on coarser grids being smaller. Some take more memory than one a few steps finer. There the
+ * density may be several steps too low, and a budget that only the finer grid fits into may be refused.
+ *
  * Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
  * than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must
  * fit, with the other methods the scratch must be large enough to plan a grid. If it is too small for all

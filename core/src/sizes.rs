@@ -112,12 +112,15 @@ pub fn sizes_with(
 }
 
 /// The finest grid of a method that fits into `index_bytes`, and its sizes: the given configuration, or one with a
-/// lower density, at most a step too low. [`Method::Bvh`] has no density: its tree fits or does not.
+/// lower density, as a rule at most a step too low. [`Method::Bvh`] has no density: its tree fits or does not.
 ///
 /// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls of [`sizes`], and at
 /// most 22. They use `scratch`: bring as much as [`sizes`] without scratch says. With less the grid may be coarser
 /// than the index requires: one-level and fixed grids must then fit by their bound, variable and recursive grids must
 /// be small enough to plan in the scratch.
+///
+/// The search relies on coarser grids being smaller. Some take more memory than one a few steps finer. There the
+/// answer may be several steps too low, and a budget that only the finer grid fits into may be refused.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or the scratch; those of [`sizes`].
