@@ -72,6 +72,10 @@ use crate::ray::round;
 /// The largest reach with which nothing overflows.
 const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
 
+/// A reach with which nothing is dropped: U, V and W, sums of up to three products of D, R and E, are below the floor.
+/// 3 * 2 D R E <= 36 * 2^-128 < 2^-120.
+const LEAST_REACH: f32 = f32::from_bits(0x1f80_0000); // 2^-64
+
 /// An upper bound of all underflow, for each unit of distance.
 const LEAST: f64 = f64::from_bits(0x3870_0000_0000_0000); // 2^-120
 
@@ -167,6 +171,12 @@ impl RayFilter {
             line: LineFilter { origin, direction, rate, slack: 0.0, floor },
             reach: distance + extent,
         }
+    }
+
+    /// Returns false if every triangle passes: then tests would only compute with denormal numbers, which is slow.
+    #[inline(always)]
+    pub(crate) fn may_drop(&self) -> bool {
+        self.reach > LEAST_REACH
     }
 
     /// Returns true unless the triangle is dropped.
@@ -491,6 +501,25 @@ mod tests {
                 assert!(beside.passes(&triangle), "{number} at {at}");
             }
         }
+    }
+
+    #[test]
+    fn in_tiny_scenes_nothing_is_dropped() {
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        for reach in [LEAST_REACH, 1e-25, 1e-38] {
+            // Half of it for the extent, a quarter for each coordinate of a corner and of the origin.
+            let mut point = || random.point().map(|x| x * reach / 4.0);
+            for _ in 0..if cfg!(miri) { 20 } else { 5_000 } {
+                let (origin, triangle) = (point(), [point(), point(), point()]);
+                let direction = point().map(|x| x / reach);
+                let half =
+                    Reach { distance: f64::from(reach) / 2.0, extent: f64::from(reach) / 2.0 };
+                let filter = RayFilter::new(direction, origin, 0.0, half);
+                assert!(!filter.may_drop() && filter.passes(&triangle), "{origin:?} {triangle:?}");
+            }
+        }
+        let reach = Reach { distance: 1e-19, extent: 0.0 };
+        assert!(RayFilter::new([1.0; 3], [0.0; 3], 0.0, reach).may_drop());
     }
 
     #[test]

@@ -311,6 +311,7 @@ impl<'a> Grid<'a> {
         let mut limit = line.end;
         // A ray meets every list at most once.
         let mut budget = Budget::new(self.structure.list_words());
+        let may_drop = test.filter.may_drop();
         let leaf = |references: &[u32], tally: &mut T| {
             if !budget.take(references.len()) {
                 return f32::NEG_INFINITY;
@@ -318,7 +319,7 @@ impl<'a> Grid<'a> {
             for &id in references {
                 tally.primitive_test();
                 let Some(triangle) = self.mesh.triangle(id) else { continue };
-                if !test.passes(&triangle) {
+                if may_drop && !test.passes(&triangle) {
                     continue;
                 }
                 match search.decide(test, &self.mesh, id) {
