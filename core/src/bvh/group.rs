@@ -30,7 +30,7 @@ use super::stack::{GroupEntry, GroupStack};
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, Ray};
-use crate::simd::{HAS_PREFETCH, Kernel, SimdLevel, dispatch};
+use crate::simd::{HAS_PREFETCH, HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
 /// Rays are scattered, and share little, if some origins lie farther apart than this part of the tree's extent.
 const SCATTERED: f32 = 1.0 / 4.0;
@@ -71,10 +71,12 @@ impl Group<'_> {
     /// alone instead.
     ///
     /// Not generic over the batch: kernels are the largest functions of the library, and all batches of a program
-    /// share them.
+    /// share them. No batch calls it without vectors, but rustc would compile its kernels nevertheless, for a minute.
     #[inline(never)]
     pub(crate) fn trace(&mut self, level: SimdLevel, is_any: bool) -> u64 {
-        if is_any {
+        if !HAS_VECTORS {
+            u64::MAX
+        } else if is_any {
             dispatch(level, Descent { group: self, leaves: TriangleLeaves::<true> })
         } else {
             dispatch(level, Descent { group: self, leaves: TriangleLeaves::<false> })
@@ -85,6 +87,10 @@ impl Group<'_> {
     /// the rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
     #[inline(never)]
     pub(crate) fn offer(&mut self, level: SimdLevel, is_any: bool, offer: &mut Offer<'_>) -> u64 {
+        if !HAS_VECTORS {
+            // As in `trace`.
+            return u64::MAX;
+        }
         dispatch(level, Descent { group: self, leaves: BoxLeaves { offer, is_any } })
     }
 }
