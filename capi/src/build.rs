@@ -166,13 +166,14 @@ pub unsafe extern "C" fn hgrid_sizes(
 
 /// Looks for the finest grid that fits into a budget.
 ///
-/// `fitted` becomes a copy of `config` with the highest density whose index fits into `index_bytes`, found in steps
-/// down from that of `config`. A step divides the number of cells by 1.41. A tree (`HGRID_METHOD_BVH`) has no cells: it
-/// fits or does not. The call does the work of `hgrid_sizes` about a dozen times, and at most 22 times. A density that
-/// is too fine for a build counts as one that does not fit.
+/// `fitted` becomes a copy of `config` with a density whose index fits into `index_bytes`, as a rule the highest one.
+/// It is found in steps down from that of `config`. A step divides the number of cells by 1.41. A tree
+/// (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call does the work of `hgrid_sizes` about a dozen times,
+/// and at most 22 times. A density that is too fine for a build counts as one that does not fit.
 ///
-/// The search relies on coarser grids being smaller. Some take more memory than one a few steps finer. There the
-/// density may be several steps too low, and a budget that only the finer grid fits into may be refused.
+/// The search relies on coarser grids being smaller. But a coarser grid may take more memory than one a few steps
+/// finer. Then the density may be several steps too low, and a budget that only the finer grid fits into may be
+/// refused.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
 /// than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must

@@ -172,7 +172,7 @@ mod tests {
         };
         let control = Control { progress: Some(&progress), ..Control::SERIAL };
         let watch = Watch::new(&control);
-        // Places up to the end, and a part without places.
+        // A part without places, and places up to the end and behind it.
         for (place, count, part) in
             [(0, 0, [0.25, 0.5]), (1, 2, [0.5, 1.0]), (2, 2, [0.5, 1.0]), (3, 2, [0.5, 1.0])]
         {

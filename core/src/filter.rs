@@ -72,8 +72,8 @@ use crate::ray::round;
 /// The largest reach with which nothing overflows.
 const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
 
-/// A reach with which nothing is dropped: U, V and W, sums of up to three products of D, R and E, are below the floor.
-/// 3 * 2 D R E <= 36 * 2^-128 < 2^-120.
+/// With this reach nothing is dropped. R and E are at most 2^-64 and D is below 6, so |U|, |V| and |det| are at most
+/// 12 * 2^-128, and |W| is at most 36 * 2^-128. That is below the floor, 2^-120 or more, with room for roundings.
 const LEAST_REACH: f32 = f32::from_bits(0x1f80_0000); // 2^-64
 
 /// An upper bound of all underflow, for each unit of distance.
@@ -173,7 +173,7 @@ impl RayFilter {
         }
     }
 
-    /// Returns false if every triangle passes: then tests would only compute with denormal numbers, which is slow.
+    /// Returns false only if every triangle passes. Its arithmetic would be on denormal numbers then, which is slow.
     #[inline(always)]
     pub(crate) fn may_drop(&self) -> bool {
         self.reach > LEAST_REACH

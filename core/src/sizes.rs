@@ -119,8 +119,8 @@ pub fn sizes_with(
 /// than the index requires: one-level and fixed grids must then fit by their bound, variable and recursive grids must
 /// be small enough to plan in the scratch.
 ///
-/// The search relies on coarser grids being smaller. Some take more memory than one a few steps finer. There the
-/// answer may be several steps too low, and a budget that only the finer grid fits into may be refused.
+/// The search relies on coarser grids being smaller. But a coarser grid may take more memory than one a few steps
+/// finer. Then the answer may be several steps too low, and a budget that only the finer grid fits into may be refused.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or the scratch; those of [`sizes`].

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_error_of_a_result_is_the_last_word() {
+    fn the_first_error_is_returned_and_ends_the_results() {
         if MOST < 3 {
             return;
         }

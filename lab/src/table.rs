@@ -137,10 +137,10 @@ impl Results {
             );
             merged.scenes.extend(race.scenes);
         }
-        let expected = merged.scenes.first().map(methods);
-        let are_equal = merged.scenes.iter().all(|scene| Some(methods(scene)) == expected);
+        let expected = merged.scenes.first().map(methods).context("results without a scene")?;
+        let are_equal = merged.scenes.iter().all(|scene| methods(scene) == expected);
         ensure!(are_equal, "results of methods that differ");
-        ensure!(expected.is_some_and(|methods| !methods.is_empty()), "results without a method");
+        ensure!(!expected.is_empty(), "results without a method");
         Ok(merged)
     }
 

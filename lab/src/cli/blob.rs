@@ -86,7 +86,10 @@ impl PackArgs {
                     "`{name}` is no name in C: take letters, digits and _"
                 );
                 let is_free = !is_reserved(name);
-                ensure!(is_free, "`{name}` has a meaning in C, C++ or hgrid.h: take another name");
+                ensure!(
+                    is_free,
+                    "`{name}` is a name of C, C++ or hgrid.h, or may become one: take another"
+                );
             }
         }
         Ok(())
@@ -98,8 +101,8 @@ fn is_identifier(name: &str) -> bool {
     is_word && name.bytes().next().is_some_and(|first| !first.is_ascii_digit())
 }
 
-/// The words of C and C++ that can be no names, the function that every program has, and macros that compilers or
-/// stdint.h define.
+/// The words of C and C++ that can be no names, the function that every program has, and macros of compilers and of
+/// stddef.h.
 const RESERVED: &str = "\
     _Alignas _Alignof _Atomic _BitInt _Bool _Complex _Decimal128 _Decimal32 _Decimal64 _Generic _Imaginary \
     _Noreturn _Static_assert _Thread_local alignas alignof and and_eq asm auto bitand bitor bool break case \
@@ -113,8 +116,9 @@ const RESERVED: &str = "\
 
 /// Returns true for words of the language, and for names that hgrid.h or the system has or may have one day.
 fn is_reserved(name: &str) -> bool {
-    let is_of_header = ["hgrid_", "HGRID_"].iter().any(|start| name.starts_with(start));
-    is_of_header || name.ends_with("_t") || RESERVED.split(' ').any(|word| word == name)
+    let is_of_header = ["hgrid_", "HGRID_", "__"].iter().any(|start| name.starts_with(start));
+    let is_of_stdint = ["_t", "_MAX", "_MIN", "_WIDTH"].iter().any(|end| name.ends_with(end));
+    is_of_header || is_of_stdint || RESERVED.split(' ').any(|word| word == name)
 }
 
 /// The arguments of `hgrid validate`.

@@ -93,12 +93,15 @@ impl Curves {
     /// # Errors
     /// If the mesh can have none of the densities.
     pub(super) fn check(&self) -> Result<()> {
-        let mut points = self.methods.iter().flat_map(Curve::points);
         ensure!(
-            points.next().is_some(),
+            self.have_points(),
             "figure 1 would show nothing, because {TOO_DENSE}: name smaller --densities"
         );
         Ok(())
+    }
+
+    pub(super) fn have_points(&self) -> bool {
+        self.methods.iter().flat_map(Curve::points).next().is_some()
     }
 
     /// Returns a sentence about the densities that the charts do not show; nothing if they show all.

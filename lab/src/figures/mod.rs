@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use hgrid_core::Method;
 use plotters::prelude::RGBColor;
 use serde::Serialize;
@@ -62,7 +62,7 @@ fn measure(args: &FiguresArgs) -> Result<()> {
 /// If the JSON is not that of figure 1, and those of drawing.
 pub(crate) fn figure1(json: &str) -> Result<String> {
     let curves: density::Curves = serde_json::from_str(json).context("no numbers of figure 1")?;
-    curves.check()?;
+    ensure!(curves.have_points(), "figure 1 would show nothing: the results have no points");
     svg(&density::Figure(&curves))
 }
 

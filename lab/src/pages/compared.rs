@@ -125,9 +125,10 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
 /// Makes a table for each scene: the ratios with their least and most, and the two numbers of each.
 ///
 /// # Errors
-/// If no scene has any.
+/// If a scene has none, or there is no scene.
 pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
-    ensure!(scenes(files).any(|(_, scene)| !scene.ratios.is_empty()), NO_RATIOS);
+    let mut all = scenes(files).peekable();
+    ensure!(all.peek().is_some() && all.all(|(_, scene)| !scene.ratios.is_empty()), NO_RATIOS);
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
         let mut table = table(&format!("{name}, {}", scene.size()), columns);
@@ -153,9 +154,11 @@ pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
 /// Makes a table for each scene: builds, bytes and the fastest mode of every workload, for each structure.
 ///
 /// # Errors
-/// If there are none.
+/// If a scene has none, or there is no scene.
 pub(super) fn systems(files: &[Comparison]) -> Result<String> {
-    ensure!(scenes(files).any(|(_, scene)| !scene.systems.is_empty()), "no structures");
+    let mut all = scenes(files).peekable();
+    let is_full = all.peek().is_some() && all.all(|(_, scene)| !scene.systems.is_empty());
+    ensure!(is_full, "no structures");
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["first build", "rebuild", "index", "peak"];
         let columns = columns.into_iter().chain(WORKLOADS).map(str::to_owned);

@@ -303,24 +303,31 @@ mod tests {
         let empty = |name: &str, list: &str| {
             let text = fs::read_to_string(root().join("lab/results").join(name)).unwrap();
             let mut result: serde_json::Value = serde_json::from_str(&text).unwrap();
-            result[list] = serde_json::Value::Array(Vec::new());
+            *result.pointer_mut(list).unwrap() = serde_json::Value::Array(Vec::new());
             fs::write(folder.join("a.json"), result.to_string()).unwrap();
         };
         let error = |kind: &str| {
             let page = format!("{BEGIN}{kind} a.json -->\n{END}\n");
             format!("{:#}", fill(&folder, "a.md", &page, &mut Vec::new()).unwrap_err())
         };
-        empty("2026-11-28d_zen4_spheres.json", "scenes");
-        for (kind, expected) in
-            [("ratios", "no ratios"), ("ratios-in-full", "no ratios"), ("systems", "no structures")]
-        {
+        let spheres = "2026-11-28d_zen4_spheres.json";
+        for (kind, list, expected) in [
+            ("ratios", "/scenes", "no ratios"),
+            ("ratios-in-full", "/scenes", "no ratios"),
+            ("ratios-in-full", "/scenes/0/ratios", "no ratios"),
+            ("systems", "/scenes", "no structures"),
+            ("systems", "/scenes/0/systems", "no structures"),
+        ] {
+            empty(spheres, list);
             assert!(error(kind).contains(expected), "{kind}: {}", error(kind));
         }
-        empty("2026-11-25_zen5_table_bunny.json", "scenes");
+        empty("2026-11-25_zen5_table_bunny.json", "/scenes");
         for kind in ["table1", "figure2"] {
-            assert!(error(kind).contains("results without a method"), "{}", error(kind));
+            assert!(error(kind).contains("results without a scene"), "{}", error(kind));
         }
-        empty("2026-11-25_zen5_figure1.json", "methods");
+        empty("2026-11-25_zen5_table_bunny.json", "/scenes/0/methods");
+        assert!(error("table1").contains("results without a method"), "{}", error("table1"));
+        empty("2026-11-25_zen5_figure1.json", "/methods");
         assert!(error("figure1").contains("figure 1 would show nothing"), "{}", error("figure1"));
         fs::remove_dir_all(&folder).unwrap();
     }

@@ -451,7 +451,7 @@ fn a_refit_of_nodes_that_lead_astray_is_refused() {
         case("a leaf behind the ids", t.node(last), |b| {
             b.set_word(t.at(last, FIRST), t.id_count as u32);
         }),
-        case("a node behind the last one", 0..usize::MAX, |b| {
+        case("a node behind the last one", t.node(t.node_count), |b| {
             b.set_word(t.at(0, CHILD), t.node_count as u32);
         }),
         case("a circle", t.all(), |b| b.set_word(t.at(above, CHILD), 0)),
