@@ -14,8 +14,9 @@
 static const float positions[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
 static const uint32_t indices[1][3] = {{0, 1, 2}};
 
-/* The grid's memory. The bounds are enough for any mesh with so many triangles; hgrid_sizes would read the
- * mesh and return less. The index keeps the grid; only the build needs the scratch. */
+/* The grid's memory. The bounds are enough for any mesh with so many triangles; with scratch, hgrid_sizes would
+ * plan the grid and return the exact size of the index. The index keeps the grid; only the build needs the
+ * scratch. */
 HGRID_ALIGNED static unsigned char index_region[HGRID_INDEX_BOUND(1)];
 HGRID_ALIGNED static unsigned char scratch_region[HGRID_SCRATCH_BOUND(1)];
 

@@ -134,13 +134,13 @@
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
- * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n,
- * hgrid_occluded_n, hgrid_occluder_n and their like for shapes and scenes, and the bytes that hgrid_peek
- * looks at need no alignment; all else does.
- * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
+ * valid during the call. These need no alignment: positions, indices, masks and boxes; the rays and
+ * answers of hgrid_intersect_n, hgrid_occluded_n, hgrid_occluder_n and their like for shapes and scenes; the
+ * bytes that hgrid_peek looks at; all scratch but that of builds, hgrid_sizes and hgrid_fit. All else does.
+ * Regions, blobs, positions, indices, masks and boxes point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
- * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
- * batch right after its rays. Views, hits and other results are written only when a call succeeds.
+ * HGRID_ERROR_NULL_ARGUMENT or, by a query that returns no status, as a miss. Outputs come last, those of
+ * a batch right after its rays. Views, hits and other results are written only when a call succeeds.
  * A report is written after an error, too, and so is the size that hgrid_pack and its like tell. A region
  * (index, scratch, parts, the room for a packed blob or for views) may hold anything after an error,
  * unless the call says otherwise.
@@ -601,12 +601,11 @@ typedef struct hgrid_config {
      */
     uint32_t flags;
     /**
-     * For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. Each needs
-     * scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with
-     * less scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above
-     * `HGRID_MAX_TASKS` counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for
-     * `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the calling thread
-     * and ignore `tasks` and `run`.
+     * For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. With `HGRID_QUALITY_FAST`
+     * each needs scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with less
+     * scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above `HGRID_MAX_TASKS`
+     * counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for `hgrid_bound` and `hgrid_fit`, which do
+     * not call it. The other methods build on the calling thread and ignore `tasks` and `run`.
      */
     uint32_t tasks;
     /**
@@ -727,8 +726,8 @@ typedef struct hgrid_grid {
  * A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
  * `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
  * with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
- * `t_min > t_max` hits nothing. A query of one ray stops a debug build of the library if all bytes of the ray are 0:
- * then nobody has written it.
+ * `t_min > t_max` hits nothing. A call for a single ray stops a debug build of the library if all bytes of the ray are
+ * 0: then nobody has written it.
  */
 typedef struct hgrid_ray {
     /**
@@ -1148,7 +1147,8 @@ typedef struct hgrid_shape_hit {
  * The boxes of your own shapes (spheres, curves, height fields) and the test for them. Initialise it with
  * `HGRID_BOXES_INIT`.
  *
- * The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried.
+ * The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried. What
+ * `context` points to must be there as long, too. The struct itself is only read during the call.
  */
 typedef struct hgrid_boxes {
     /**
@@ -1185,9 +1185,9 @@ typedef struct hgrid_boxes {
      * hit.
      *
      * `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
-     * NaN, is no hit. The test is called on the calling thread, for shapes whose box the ray meets and perhaps some
-     * others, roughly front to back, and for each shape at most once for each ray. It may query this
-     * tree and others, and must not be left by `longjmp` or by a C++ exception.
+     * NaN, is no hit. The test is called on the thread that queries, on several at once if several query, for shapes
+     * whose box the ray meets and perhaps some others, roughly front to back, and for each shape at most once for each
+     * ray. It may query this tree and others, and must not be left by `longjmp` or by a C++ exception.
      */
     bool (*test)(void *context,
                  uint32_t shape,
@@ -1268,7 +1268,7 @@ typedef struct hgrid_instance {
 /**
  * A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
  * of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
- * A query stops a debug build of the library if all numbers of the ray are 0.
+ * A call for a single ray stops a debug build of the library if all numbers of the ray are 0.
  */
 typedef struct hgrid_ray_f64 {
     /**
@@ -1353,7 +1353,8 @@ typedef struct hgrid_scene_options {
      * Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
      * far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
      * be replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
-     * `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+     * `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it. It runs on the calling
+     * thread, may query the same scene, and must not be left by `longjmp` or by a C++ exception.
      */
     hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
     /**
@@ -1485,7 +1486,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_STRUCT_SIZE -2
 
 /**
- * The index, the scratch, the blob or the room for one does not start at a multiple of
+ * The index, the scratch, the blob, or the room for a blob or for views does not start at a multiple of
  * `HGRID_ALIGNMENT`.
  */
 #define HGRID_ERROR_MISALIGNED -3
@@ -1544,8 +1545,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INDEX_OUT_OF_RANGE -24
 
 /**
- * A triangle has a coordinate that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is
- * set. The report says which triangle.
+ * A triangle or a box has a number that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is set; or, in a
+ * refit with any flags, one that the build did not leave out has such a number now. The report says which.
  */
 #define HGRID_ERROR_NON_FINITE -25
 
@@ -1733,9 +1734,9 @@ extern "C" {
  * the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
  * joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without triangles.
  * `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the number of
- * all triangles and vertices, and `parts`; its other fields are 0 or NULL. Every call that takes it, `hgrid_open` too,
- * first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
- * after arrays moved or counts changed, join the meshes again.
+ * all triangles and vertices, and `parts`. It has no arrays, and its strides mean nothing. Every call that takes it,
+ * `hgrid_open` too, first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and
+ * for another build; after arrays moved or counts changed, join the meshes again.
  *
  * The report of a build that fails names the triangle to blame by its number in the joined mesh: subtract the
  * triangle counts of the meshes before its own.
@@ -1792,9 +1793,9 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * is 1. That takes about half the time of a build; with recursive and bvh, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
- * With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: each
- * takes scratch, and all of them fill the index, which may be a little larger. With bvh the sizes are then
- * bounds for any mesh, and `is_exact` is 0. The call may use `run`, too, but not `progress`.
+ * With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: with
+ * `HGRID_QUALITY_FAST` each takes scratch, and all of them fill the index, which may be a little larger. With bvh the
+ * sizes are then bounds for any mesh, and `is_exact` is 0. The call uses neither `run` nor `progress`.
  *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
  * if its size is 0; scratch that is too small is no error, and counts as none.
@@ -1811,7 +1812,7 @@ hgrid_status hgrid_bound(size_t triangle_count,
  *   `HGRID_ERROR_INVALID_QUALITY`.
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
- * call starts no thread; tasks are called on those that `run` chooses.
+ * call starts no thread.
  */
 hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
                          const struct hgrid_config *config,
@@ -2406,12 +2407,11 @@ hgrid_status hgrid_pack(const struct hgrid_grid *grid,
  * Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
  * those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
  *
- * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
- * strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
- * fields are 0. Of meshes that were joined it is the joined one, unless they were packed: a packed mesh is
- * one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
- * or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
- * it as it was.
+ * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides that are not 0,
+ * and arrays that are NULL if they are empty; without masks both of their fields are 0. Of meshes that were joined it
+ * is the joined one, with `parts`, without arrays and with strides of 0, unless they were packed: a packed mesh is
+ * one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`; or
+ * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it was.
  *
  * Threads: any number of calls and queries on the same grid at once, each with a mesh of its own.
  */
@@ -2642,7 +2642,8 @@ hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
                                      const struct hgrid_query_options *options);
 
 /**
- * Makes an object of a grid.
+ * Makes an object of a grid. The object keeps the address of this view, so the view stays where it is for as long as
+ * scenes that show the object are queried.
  *
  * Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a
  * view of zeros.
@@ -2653,7 +2654,8 @@ hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
                                struct hgrid_object *object);
 
 /**
- * Makes an object of a tree of shapes, which brings its test.
+ * Makes an object of a tree of shapes, which brings its test. The object keeps the address of the view, as that of
+ * `hgrid_object_grid` does.
  *
  * The test gets the ray in the object's space, with a direction and a range of its own. The `t` of its answer is
  * along this ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
@@ -2665,7 +2667,8 @@ hgrid_status hgrid_object_shapes(const struct hgrid_shapes *shapes,
                                  struct hgrid_object *object);
 
 /**
- * Makes an object of a scene, to be shown in another one. No argument may be NULL. Returns `HGRID_OK`, or what
+ * Makes an object of a scene, to be shown in another one. The object keeps the address of the view, as that of
+ * `hgrid_object_grid` does. No argument may be NULL. Returns `HGRID_OK`, or what
  * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
@@ -2690,9 +2693,10 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * Builds a scene: a tree over instances of objects, in O(n).
  *
  * The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as
- * long as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
- * `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by number, and
- * `hgrid_open_scene` opens it elsewhere with the same objects.
+ * long as the scene is queried. Every object in it, shown or not, begins as `HGRID_OBJECT_INIT` or comes from
+ * `hgrid_object_grid` or its like; other bytes are undefined behaviour. Any number of instances may show one. Scenes
+ * may be shown in scenes, `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by
+ * number, and `hgrid_open_scene` opens it elsewhere with the same objects.
  *
  * ```c
  * static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,
@@ -2933,8 +2937,11 @@ bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
  * Takes a normal from the space of the object that a hit names to the scene's, of length 1.
  *
  * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit,
- * cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit
- * names nothing in the scene, or the normal is null, or it is NULL and the hit names no triangle.
+ * cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing, if
+ * - the hit names nothing in the scene,
+ * - `object_normal` is three zeros,
+ * - `object_normal` is NULL, and the hit names no triangle, or one without area,
+ * - the view is one of zeros, or another pointer is NULL.
  *
  * Threads: any number of calls and queries on the same scene at once.
  */

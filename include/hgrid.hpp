@@ -114,7 +114,8 @@ struct report : ::hgrid_report {
 };
 /// The statistics of a grid and its mesh. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
-/// The report of a refit. See `hgrid_refit_report`.
+/// The report of a refit. See `hgrid_refit_report`. Unlike `report` it does not initialise itself: wherever a refit
+/// takes one, it begins as `HGRID_REFIT_REPORT_INIT`.
 using refit_report = ::hgrid_refit_report;
 /// The contents of a blob's header. See `hgrid_blob_info`.
 using blob_info = ::hgrid_blob_info;
@@ -123,7 +124,8 @@ using point = std::array<float, 3>;
 
 /// The id that no triangle has; in a hit of a batch, a miss.
 HGRID_INLINE constexpr std::uint32_t invalid_id = HGRID_INVALID_ID;
-/// The alignment, in bytes, of every blob, index and scratch of a build. See `HGRID_ALIGNMENT`.
+/// The alignment, in bytes, of every blob and index, of the views of a packed scene, and of the scratch of builds,
+/// `sizes` and `fit`. See `HGRID_ALIGNMENT`.
 HGRID_INLINE constexpr std::size_t alignment = HGRID_ALIGNMENT;
 
 #if defined(__GNUC__)
@@ -156,7 +158,8 @@ inline constexpr std::size_t bvh_high_scratch_bound(std::size_t triangles) noexc
 {
     return HGRID_BVH_HIGH_SCRATCH_BOUND(triangles);
 }
-/// Bytes of scratch that are enough for `view::validate` with so many triangles.
+/// Bytes of scratch that are enough for `validate` of a view, of shapes or of a scene, with so many triangles, shapes
+/// or instances.
 inline constexpr std::size_t validate_bound(std::size_t triangles) noexcept
 {
     return HGRID_VALIDATE_BOUND(triangles);
@@ -341,7 +344,8 @@ inline constexpr ray_f64 make_ray_f64(const std::array<double, 3> &origin, const
             0};
 }
 
-/// Returns true if the library that is linked has the version of this header, up to the patch number.
+/// Returns true if the library that is linked has the major and minor version of this header. The patch number may
+/// differ.
 inline bool is_compatible() noexcept
 {
     return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
@@ -1726,7 +1730,8 @@ private:
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"
 #endif
-/// Bytes of index that are enough for any scene of so many instances; of scratch `scratch_bound` is enough.
+/// Bytes of index that are enough for any scene of so many instances. With the default configuration `scratch_bound` is
+/// enough scratch, with `quality::high` `bvh_high_scratch_bound`.
 inline constexpr std::size_t scene_bound(std::size_t instances) noexcept
 {
     return HGRID_SCENE_BOUND(instances);
@@ -1818,7 +1823,7 @@ public:
             ::hgrid_refit_shapes(&of.c(), blob.data(), blob.size(), &moved.raw_, details));
         return answer == status::ok ? result<shapes>(moved) : answer;
     }
-    /// Proves that the blob is a tree of its boxes.
+    /// Proves that the blob is a tree of its boxes, in scratch of `validate_bound` bytes.
     status validate(span<byte> scratch) const noexcept
     {
         return detail::said(::hgrid_validate_shapes(&raw_, scratch.data(), scratch.size()));
@@ -1949,7 +1954,7 @@ public:
         const ::hgrid_config raw = how.c();
         return detail::said(::hgrid_scene_bound(instances, &raw, &details));
     }
-    /// Proves that the blob is a scene of its objects.
+    /// Proves that the blob is a scene of its objects, in scratch of `validate_bound` bytes.
     status validate(span<byte> scratch) const noexcept
     {
         return detail::said(::hgrid_validate_scene(&raw_, scratch.data(), scratch.size()));
@@ -1986,7 +1991,7 @@ public:
         return bytes;
     }
     /// Opens what `pack` wrote, where it lies, with memory for its views, both of which stay where they are. With
-    /// scratch all that is in it is proven.
+    /// scratch, of which a 64th of the blob's bytes is enough, all that is in it is proven; without, nothing is.
     static result<scene> open_packed(span<const byte> blob, span<byte> views,
                                      span<byte> scratch = span<byte>()) noexcept
     {

@@ -189,12 +189,11 @@ pub unsafe extern "C" fn hgrid_pack(
 /// Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
 /// those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
 ///
-/// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
-/// strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
-/// fields are 0. Of meshes that were joined it is the joined one, unless they were packed: a packed mesh is
-/// one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
-/// or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
-/// it as it was.
+/// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides that are not 0,
+/// and arrays that are NULL if they are empty; without masks both of their fields are 0. Of meshes that were joined it
+/// is the joined one, with `parts`, without arrays and with strides of 0, unless they were packed: a packed mesh is
+/// one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`; or
+/// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it was.
 ///
 /// Threads: any number of calls and queries on the same grid at once, each with a mesh of its own.
 ///

@@ -35,9 +35,9 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_repor
 /// the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
 /// joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without triangles.
 /// `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the number of
-/// all triangles and vertices, and `parts`; its other fields are 0 or NULL. Every call that takes it, `hgrid_open` too,
-/// first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
-/// after arrays moved or counts changed, join the meshes again.
+/// all triangles and vertices, and `parts`. It has no arrays, and its strides mean nothing. Every call that takes it,
+/// `hgrid_open` too, first reads all parts. After vertices moved, the same joined mesh is good for `hgrid_refit` and
+/// for another build; after arrays moved or counts changed, join the meshes again.
 ///
 /// The report of a build that fails names the triangle to blame by its number in the joined mesh: subtract the
 /// triangle counts of the meshes before its own.
@@ -120,9 +120,9 @@ pub unsafe extern "C" fn hgrid_bound(
 /// is 1. That takes about half the time of a build; with recursive and bvh, which have to build
 /// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
-/// With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: each
-/// takes scratch, and all of them fill the index, which may be a little larger. With bvh the sizes are then
-/// bounds for any mesh, and `is_exact` is 0. The call may use `run`, too, but not `progress`.
+/// With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: with
+/// `HGRID_QUALITY_FAST` each takes scratch, and all of them fill the index, which may be a little larger. With bvh the
+/// sizes are then bounds for any mesh, and `is_exact` is 0. The call uses neither `run` nor `progress`.
 ///
 /// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
 /// if its size is 0; scratch that is too small is no error, and counts as none.
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn hgrid_bound(
 ///   `HGRID_ERROR_INVALID_QUALITY`.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
-/// call starts no thread; tasks are called on those that `run` chooses.
+/// call starts no thread.
 ///
 /// # Safety
 /// Pointers are as the head of this file says.

@@ -29,8 +29,8 @@ pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 /// A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
 /// `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
 /// with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
-/// `t_min > t_max` hits nothing. A query of one ray stops a debug build of the library if all bytes of the ray are 0:
-/// then nobody has written it.
+/// `t_min > t_max` hits nothing. A call for a single ray stops a debug build of the library if all bytes of the ray are
+/// 0: then nobody has written it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray {

@@ -72,7 +72,7 @@ impl hgrid_scene {
 
 /// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
 /// of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
-/// A query stops a debug build of the library if all numbers of the ray are 0.
+/// A call for a single ray stops a debug build of the library if all numbers of the ray are 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray_f64 {
@@ -127,7 +127,8 @@ pub struct hgrid_scene_options {
     /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
     /// far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
     /// be replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
-    /// `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+    /// `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it. It runs on the calling
+    /// thread, may query the same scene, and must not be left by `longjmp` or by a C++ exception.
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,
@@ -186,7 +187,8 @@ impl From<hgrid_ray_f64> for RayF64 {
     }
 }
 
-/// Makes an object of a grid.
+/// Makes an object of a grid. The object keeps the address of this view, so the view stays where it is for as long as
+/// scenes that show the object are queried.
 ///
 /// Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a
 /// view of zeros.
@@ -210,7 +212,8 @@ pub unsafe extern "C" fn hgrid_object_grid(
     made.err().unwrap_or(HGRID_OK)
 }
 
-/// Makes an object of a tree of shapes, which brings its test.
+/// Makes an object of a tree of shapes, which brings its test. The object keeps the address of the view, as that of
+/// `hgrid_object_grid` does.
 ///
 /// The test gets the ray in the object's space, with a direction and a range of its own. The `t` of its answer is
 /// along this ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
@@ -235,7 +238,8 @@ pub unsafe extern "C" fn hgrid_object_shapes(
     made.err().unwrap_or(HGRID_OK)
 }
 
-/// Makes an object of a scene, to be shown in another one. No argument may be NULL. Returns `HGRID_OK`, or what
+/// Makes an object of a scene, to be shown in another one. The object keeps the address of the view, as that of
+/// `hgrid_object_grid` does. No argument may be NULL. Returns `HGRID_OK`, or what
 /// `hgrid_object_grid` returns.
 ///
 /// Threads: any number of calls at once.
@@ -287,9 +291,10 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// Builds a scene: a tree over instances of objects, in O(n).
 ///
 /// The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as
-/// long as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
-/// `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by number, and
-/// `hgrid_open_scene` opens it elsewhere with the same objects.
+/// long as the scene is queried. Every object in it, shown or not, begins as `HGRID_OBJECT_INIT` or comes from
+/// `hgrid_object_grid` or its like; other bytes are undefined behaviour. Any number of instances may show one. Scenes
+/// may be shown in scenes, `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by
+/// number, and `hgrid_open_scene` opens it elsewhere with the same objects.
 ///
 /// ```c
 /// static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,

@@ -83,8 +83,11 @@ pub unsafe extern "C" fn hgrid_scene_surface_at(
 /// Takes a normal from the space of the object that a hit names to the scene's, of length 1.
 ///
 /// `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit,
-/// cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit
-/// names nothing in the scene, or the normal is null, or it is NULL and the hit names no triangle.
+/// cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing, if
+/// - the hit names nothing in the scene,
+/// - `object_normal` is three zeros,
+/// - `object_normal` is NULL, and the hit names no triangle, or one without area,
+/// - the view is one of zeros, or another pointer is NULL.
 ///
 /// Threads: any number of calls and queries on the same scene at once.
 ///

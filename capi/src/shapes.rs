@@ -29,7 +29,8 @@ pub struct hgrid_shape_hit {
 /// The boxes of your own shapes (spheres, curves, height fields) and the test for them. Initialise it with
 /// `HGRID_BOXES_INIT`.
 ///
-/// The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried.
+/// The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried. What
+/// `context` points to must be there as long, too. The struct itself is only read during the call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_boxes {
@@ -52,9 +53,9 @@ pub struct hgrid_boxes {
     /// hit.
     ///
     /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
-    /// NaN, is no hit. The test is called on the calling thread, for shapes whose box the ray meets and perhaps some
-    /// others, roughly front to back, and for each shape at most once for each ray. It may query this
-    /// tree and others, and must not be left by `longjmp` or by a C++ exception.
+    /// NaN, is no hit. The test is called on the thread that queries, on several at once if several query, for shapes
+    /// whose box the ray meets and perhaps some others, roughly front to back, and for each shape at most once for each
+    /// ray. It may query this tree and others, and must not be left by `longjmp` or by a C++ exception.
     pub test: Option<
         unsafe extern "C" fn(
             context: *mut c_void,

@@ -22,7 +22,7 @@ pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 /// with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
-/// The index, the scratch, the blob or the room for one does not start at a multiple of
+/// The index, the scratch, the blob, or the room for a blob or for views does not start at a multiple of
 /// `HGRID_ALIGNMENT`.
 pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
@@ -61,8 +61,8 @@ pub const HGRID_ERROR_TOO_MANY_TRIANGLES: hgrid_status = -23;
 /// A triangle names a vertex that the mesh does not have. The report says which triangle.
 pub const HGRID_ERROR_INDEX_OUT_OF_RANGE: hgrid_status = -24;
 
-/// A triangle has a coordinate that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is
-/// set. The report says which triangle.
+/// A triangle or a box has a number that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is set; or, in a
+/// refit with any flags, one that the build did not leave out has such a number now. The report says which.
 pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 
 /// The mask stride is below 4 bytes, or the masks do not fit into memory.

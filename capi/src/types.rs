@@ -204,12 +204,11 @@ pub struct hgrid_config {
     pub reserved: u32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-    /// For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. Each needs
-    /// scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with
-    /// less scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above
-    /// `HGRID_MAX_TASKS` counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for
-    /// `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the calling thread
-    /// and ignore `tasks` and `run`.
+    /// For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. With `HGRID_QUALITY_FAST`
+    /// each needs scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with less
+    /// scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above `HGRID_MAX_TASKS`
+    /// counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for `hgrid_bound` and `hgrid_fit`, which do
+    /// not call it. The other methods build on the calling thread and ignore `tasks` and `run`.
     pub tasks: u32,
     /// For `HGRID_METHOD_BVH`: `HGRID_QUALITY_FAST`, which is 0, or `HGRID_QUALITY_HIGH`. The other methods do not
     /// look at it.
