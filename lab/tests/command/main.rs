@@ -1,5 +1,8 @@
 //! `hgrid` as a program: its arguments, files and exit statuses, run as by a shell.
 
+#[cfg(target_os = "linux")]
+mod outputs;
+
 use std::fs;
 use std::io;
 use std::path::PathBuf;
@@ -20,10 +23,16 @@ impl Folder {
         Ok(Self(folder))
     }
 
+    /// The command in the folder.
+    fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+        command.current_dir(&self.0).args(words.split_whitespace());
+        command
+    }
+
     /// Runs the command in the folder.
     fn hgrid(&self, words: &str) -> io::Result<Output> {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
-        command.current_dir(&self.0).args(words.split_whitespace()).output()
+        self.command(words).output()
     }
 
     /// Returns the output of a command that succeeds.

@@ -1,39 +1,13 @@
-//! What the command does when an output takes nothing, takes only a part, or is a pipe.
-
-#![cfg(target_os = "linux")]
+//! Outputs that take nothing or only a part, and pipes.
 
 use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use hgrid_core::{Block, Config, Grid, Instance, Object, Scene, TriangleMesh};
 
-/// A folder with a mesh in it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> io::Result<Self> {
-        let folder =
-            std::env::temp_dir().join(format!("hgrid-outputs-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder)?;
-        fs::write(folder.join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")?;
-        Ok(Self(folder))
-    }
-
-    /// The command in the folder, with words between spaces.
-    fn command(&self, words: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
-        command.current_dir(&self.0).args(words.split(' '));
-        command
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use super::Folder;
 
 fn full() -> io::Result<File> {
     File::options().write(true).open("/dev/full")
