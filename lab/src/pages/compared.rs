@@ -87,6 +87,12 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
     })
 }
 
+/// Returns true if there are scenes, and all of them have something.
+fn have_all(files: &[Comparison], something: impl Fn(&Scene) -> bool) -> bool {
+    let mut all = scenes(files).peekable();
+    all.peek().is_some() && all.all(|(_, scene)| something(scene))
+}
+
 impl Scene {
     /// Returns the number of triangles or spheres, and that of instances if there are any.
     fn size(&self) -> String {
@@ -127,8 +133,7 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
 /// # Errors
 /// If a scene has none, or there is no scene.
 pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
-    let mut all = scenes(files).peekable();
-    ensure!(all.peek().is_some() && all.all(|(_, scene)| !scene.ratios.is_empty()), NO_RATIOS);
+    ensure!(have_all(files, |scene| !scene.ratios.is_empty()), NO_RATIOS);
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
         let mut table = table(&format!("{name}, {}", scene.size()), columns);
@@ -156,9 +161,7 @@ pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
 /// # Errors
 /// If a scene has none, or there is no scene.
 pub(super) fn systems(files: &[Comparison]) -> Result<String> {
-    let mut all = scenes(files).peekable();
-    let is_full = all.peek().is_some() && all.all(|(_, scene)| !scene.systems.is_empty());
-    ensure!(is_full, "no structures");
+    ensure!(have_all(files, |scene| !scene.systems.is_empty()), "no structures");
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["first build", "rebuild", "index", "peak"];
         let columns = columns.into_iter().chain(WORKLOADS).map(str::to_owned);
