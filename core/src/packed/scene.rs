@@ -168,9 +168,9 @@ impl<'a> Scene<'a> {
         Ok(PackedSizes { members, references, start, end: start.saturating_add(bytes) })
     }
 
-    /// Bytes that [`pack`](Self::pack) writes; 0 if it cannot. Both take O(n^2) time in the objects of all scenes.
-    /// Those of a nested scene count as often as there are ways to it: 100 scenes that each name the same 100 scenes of
-    /// 100 objects make a million.
+    /// Bytes that [`pack`](Self::pack) writes; 0 if it cannot. Both take O(n^2) time in the objects of all scenes. The
+    /// objects of a nested scene count once for each way that leads to it: 100 scenes that each name the same 100
+    /// scenes of 100 objects make a million.
     #[must_use]
     pub fn packed_bytes(&self) -> u64 {
         self.plan().map_or(0, |plan| plan.end)
