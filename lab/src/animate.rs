@@ -2,8 +2,8 @@
 //!
 //! Every vertex swings along its normal. A wave that travels through the mesh gives the phase, and all
 //! vertices are back in place after the last frame. Each frame does what a game does: it moves the vertices,
-//! builds into the same memory and traces all rays in tiles. The sizes are computed once, before the first
-//! frame, and again only if a later frame needs more. A field of instances is a scene over the mesh's grid,
+//! builds into the same memory and traces all rays in tiles. The sizes are computed in the first frame, and
+//! again only if a later frame needs more. A field of instances is a scene over the mesh's grid,
 //! and is built or refitted after it.
 
 use core::f64::consts::TAU;
@@ -52,8 +52,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
     tell(&scene);
     let up = args.picture.up.unwrap_or_else(|| Up::of(&scene));
-    let field = Field::new(scene.framed_bounds(), args.instances, up);
-    let field = (args.instances > 0).then_some(field);
+    let field = Field::over(&scene, args.instances, Some(up));
     let focus = field.map(|field| field.bounds()).or(scene.focus);
     let shown = Scene { focus, is_z_up: Some(up == Up::Z), ..scene.clone() };
     let tiles = args.picture.tiles(&shown)?;
@@ -136,7 +135,7 @@ pub struct Report {
     pub threads: u32,
     /// Pixels on each side.
     pub size: u16,
-    /// Frames for which the memory was too small and had to grow.
+    /// Regions that were too small for a frame and had to grow: a frame can have two.
     pub grown: u32,
     /// Bytes of the largest grid.
     pub index_bytes: usize,
@@ -144,8 +143,8 @@ pub struct Report {
     pub scene_bytes: usize,
     /// The middle values of all frames.
     pub median: Frame,
-    /// One for each frame. The first is the slowest, because the system provides the pages when they are
-    /// first written.
+    /// One for each frame. The first is the slowest: it computes the sizes, and the system provides pages when they
+    /// are first written.
     pub frames: Vec<Frame>,
 }
 

@@ -25,6 +25,7 @@ pub use self::picture::Picture;
 use self::render::RenderArgs;
 pub use self::tuning::Tuning;
 use self::values::{density, method_parser, output_parser, quality_parser, thread_parser, whole};
+use crate::camera::Up;
 use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
 use crate::compare::shown::Shown;
@@ -225,7 +226,7 @@ pub struct FiguresArgs {
 }
 
 impl FiguresArgs {
-    /// Refuses trees alone, and parameters of methods that do not compete.
+    /// Refuses trees alone, densities named twice, and parameters of methods that do not compete.
     ///
     /// # Errors
     /// If there are such; the message says what to change.
@@ -234,6 +235,10 @@ impl FiguresArgs {
             self.race.configs().iter().any(|config| config.parameters.density().is_some()),
             "figure 1 shows densities, which bvh has none of: add another of --methods"
         );
+        for (number, density) in self.densities.iter().enumerate() {
+            let is_new = !self.densities[..number].contains(density);
+            ensure!(is_new, "--densities has {density} twice: name each once");
+        }
         self.race.check()
     }
 }
@@ -259,7 +264,7 @@ pub struct AnimateArgs {
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0,
           value_parser = whole(0..=10_000_000_u32))]
     pub instances: u32,
-    /// From the second frame on, give the trees of the first one their new boxes, for `bvh`
+    /// For `bvh`: build the tree of the first frame only; later frames update its boxes
     #[arg(long)]
     pub refit: bool,
     /// Threads that build, for `bvh`, and render, 1 to 64
@@ -400,6 +405,9 @@ pub struct FirstBuildArgs {
     /// Build over a sphere in place of each triangle
     #[arg(long, conflicts_with = "instances")]
     pub spheres: bool,
+    /// Which axis of the scene is up, for the field of instances
+    #[arg(long, value_enum)]
+    pub up: Option<Up>,
 }
 
 impl FirstBuildArgs {

@@ -45,10 +45,11 @@ impl Field {
         Self { count, up, middle, extent, height }
     }
 
-    /// Makes a field of so many instances of a scene, on its ground plane; none for 0.
+    /// Makes a field of so many instances of a scene, on its ground plane; none for 0. An axis that is up may be named.
     #[must_use]
-    pub fn over(scene: &Model, count: u32) -> Option<Self> {
-        (count > 0).then(|| Self::new(scene.framed_bounds(), count, Up::of(scene)))
+    pub fn over(scene: &Model, count: u32, up: Option<Up>) -> Option<Self> {
+        let up = up.unwrap_or_else(|| Up::of(scene));
+        (count > 0).then(|| Self::new(scene.framed_bounds(), count, up))
     }
 
     /// Sets the part of the scene that pictures show to the field.
@@ -67,7 +68,8 @@ impl Field {
         f64::from(self.count).sqrt().ceil().max(1.0)
     }
 
-    /// Returns the box around all instances at any time, as long as no vertex of the mesh moves.
+    /// Returns the box of the places of all instances, half a step around the outermost ones. Large instances at its
+    /// border reach out of it, by less than two fifths of the mesh's extent.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let reach = 0.5 * self.side() * STEP * self.extent;
@@ -196,6 +198,18 @@ pub(crate) fn shade(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_named_axis_goes_before_that_of_the_scene() {
+        let scene = Model::load("procedural:knot:500").unwrap();
+        let height = |up| {
+            let (min, max) = Field::over(&scene, 100, up).unwrap().bounds();
+            [1, 2].map(|axis| max[axis] - min[axis])
+        };
+        let ([y, z], [other_y, other_z]) = (height(None), height(Some(Up::Z)));
+        assert!(y < z && other_z < other_y);
+        assert!(Field::over(&scene, 0, None).is_none());
+    }
 
     #[test]
     fn instances_stay_in_the_field_and_come_back() {

@@ -4,18 +4,27 @@ use hgrid_core::Hit;
 
 use super::system::is_hit;
 
-/// The largest distance between hits that count as the same, as a part of the scene's diagonal.
+/// The largest distance between hits that count as the same, as a part of the mesh's diagonal.
 const TOLERANCE: f64 = 1e-4;
+
+/// The same as a part of the diagonal of a field of instances, if that is more: rounding errors grow with coordinates.
+const TOLERANCE_OF_FIELD: f64 = 1e-6;
 
 /// The part of the rays, in thousandths, that may differ before a system is marked.
 const MARKED_ABOVE: u64 = 1;
 
+/// Returns the largest distance between hits that count as the same, for a mesh and a scene with these diagonals.
+#[must_use]
+pub fn tolerance(of_mesh: f64, of_scene: f64) -> f64 {
+    (TOLERANCE * of_mesh).max(TOLERANCE_OF_FIELD * of_scene)
+}
+
 /// Counts the rays whose answers differ: one hits and the other does not, or they hit at different distances.
 /// Directions are about one long, so `t` is a length.
 #[must_use]
-pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
+pub fn differing_hits(expected: &[Hit], found: &[Hit], tolerance: f64) -> u64 {
     let is_same = |a: &Hit, b: &Hit| match (is_hit(a), is_hit(b)) {
-        (true, true) => (f64::from(a.t) - f64::from(b.t)).abs() <= TOLERANCE * diagonal,
+        (true, true) => (f64::from(a.t) - f64::from(b.t)).abs() <= tolerance,
         (a, b) => a == b,
     };
     count(expected.iter().zip(found), |(a, b)| !is_same(a, b))
@@ -23,9 +32,9 @@ pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
 
 /// Counts the distances that differ: only one is finite, or they are too far apart.
 #[must_use]
-pub fn differing_distances(expected: &[f32], found: &[f32], diagonal: f64) -> u64 {
+pub fn differing_distances(expected: &[f32], found: &[f32], tolerance: f64) -> u64 {
     let is_same = |a: f32, b: f32| match (a.is_finite(), b.is_finite()) {
-        (true, true) => (f64::from(a) - f64::from(b)).abs() <= TOLERANCE * diagonal,
+        (true, true) => (f64::from(a) - f64::from(b)).abs() <= tolerance,
         (a, b) => a == b,
     };
     count(expected.iter().zip(found), |(&a, &b)| !is_same(a, b))
@@ -68,17 +77,24 @@ mod tests {
         let hit = |t| Hit { t, u: 0.1, v: 0.1, primitive: 3 };
         let expected = [hit(1.0), hit(1.0), hit(1.0), Hit::MISS, Hit::MISS];
         let found = [hit(1.000_01), hit(1.1), Hit::MISS, hit(1.0), Hit::MISS];
-        assert_eq!(differing_hits(&expected, &found, 1.0), 3);
-        assert_eq!(differing_hits(&expected, &found, 2000.0), 2);
+        assert_eq!(differing_hits(&expected, &found, 1e-4), 3);
+        assert_eq!(differing_hits(&expected, &found, 0.2), 2);
         assert_eq!(hits(&expected), 3);
         assert_eq!((unequal(&expected, &found), unequal(&found, &found)), (4, 0));
+    }
+
+    #[test]
+    fn a_large_field_has_a_larger_tolerance() {
+        for (of_scene, expected) in [(1.0, 1e-4), (100.0, 1e-4), (1000.0, 1e-3)] {
+            assert!((tolerance(1.0, of_scene) / expected - 1.0).abs() < 1e-9, "{of_scene}");
+        }
     }
 
     #[test]
     fn other_distances_differ() {
         let (none, expected) = (f32::INFINITY, [1.0, 1.0, 1.0, f32::INFINITY, f32::INFINITY]);
         let found = [1.000_01, 1.1, none, 1.0, none];
-        assert_eq!(differing_distances(&expected, &found, 1.0), 3);
+        assert_eq!(differing_distances(&expected, &found, 1e-4), 3);
         assert_eq!((finite(&expected), finite(&found)), (3, 3));
     }
 

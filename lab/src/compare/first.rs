@@ -9,6 +9,7 @@ use std::io::{self, Write as _};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, ensure};
+use clap::ValueEnum as _;
 use serde::{Deserialize, Serialize};
 
 use super::input::Input;
@@ -17,6 +18,7 @@ use super::samples::Watch;
 use super::shown::Shown;
 use super::system::System;
 use super::system_named;
+use crate::camera::Up;
 use crate::cli::FirstBuildArgs;
 use crate::field::Field;
 use crate::scene::Scene;
@@ -42,7 +44,7 @@ pub type FirstBuilds<'a> = dyn Fn(&dyn System) -> Result<FirstBuild> + 'a;
 /// If there is no such scene or system, or it cannot be built.
 pub fn run(args: &FirstBuildArgs) -> Result<()> {
     let system = system_named(&args.system)?;
-    let first = in_this_process(&args.scene, args.shown(), system.as_ref())?;
+    let first = in_this_process(&args.scene, args.shown(), args.up, system.as_ref())?;
     Ok(writeln!(io::stdout(), "{}", serde_json::to_string(&first)?)?)
 }
 
@@ -50,9 +52,14 @@ pub fn run(args: &FirstBuildArgs) -> Result<()> {
 ///
 /// # Errors
 /// If the scene cannot be loaded, or the structure not be built.
-pub fn in_this_process(scene: &OsStr, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_this_process(
+    scene: &OsStr,
+    shown: Shown,
+    up: Option<Up>,
+    system: &dyn System,
+) -> Result<FirstBuild> {
     let scene = Scene::load(scene)?;
-    let field = Field::over(&scene, shown.instances());
+    let field = Field::over(&scene, shown.instances(), up);
     let input = Input::of(scene, shown, field.as_ref());
     // Free what loading has left on the heap.
     give_back_heap();
@@ -70,11 +77,19 @@ pub fn in_this_process(scene: &OsStr, shown: Shown, system: &dyn System) -> Resu
 ///
 /// # Errors
 /// If that process fails.
-pub fn in_new_process(scene: &OsStr, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_new_process(
+    scene: &OsStr,
+    shown: Shown,
+    up: Option<Up>,
+    system: &dyn System,
+) -> Result<FirstBuild> {
     let program = env::current_exe().context("this program has no file")?;
     let mut command = Command::new(program);
     command.arg(COMMAND).arg(scene).arg(system.name());
     command.args(shown.words()).stderr(Stdio::inherit());
+    if let Some(up) = up.and_then(|up| up.to_possible_value()) {
+        command.args(["--up", up.get_name()]);
+    }
     let output = command.output().context("cannot start a process for a first build")?;
     ensure!(output.status.success(), "the process for a first build failed");
     serde_json::from_slice(&output.stdout).context("a first build printed no time")
@@ -87,16 +102,19 @@ mod tests {
     #[test]
     fn a_first_build_takes_time_and_names_what_is_missing() {
         let (system, knot) = (system_named("one-level").unwrap(), "procedural:knot:500".as_ref());
-        let first = in_this_process(knot, Shown::Mesh, system.as_ref()).unwrap();
+        let first = in_this_process(knot, Shown::Mesh, None, system.as_ref()).unwrap();
         assert!(first.seconds > 0.0);
         let system = system_named("bvh").unwrap();
-        let field = in_this_process(knot, Shown::Instances(9), system.as_ref()).unwrap();
+        let field =
+            in_this_process(knot, Shown::Instances(9), Some(Up::Z), system.as_ref()).unwrap();
         assert!(field.seconds > 0.0);
-        let spheres = in_this_process(knot, Shown::Spheres, system.as_ref());
+        let spheres = in_this_process(knot, Shown::Spheres, None, system.as_ref());
         assert!(spheres.unwrap().seconds > 0.0);
         let json = serde_json::to_string(&first).unwrap();
         assert_eq!(serde_json::from_str::<FirstBuild>(&json).unwrap(), first);
-        assert!(in_this_process("no/such.ply".as_ref(), Shown::Mesh, system.as_ref()).is_err());
+        assert!(
+            in_this_process("no/such.ply".as_ref(), Shown::Mesh, None, system.as_ref()).is_err()
+        );
         let error = system_named("nothing").map(drop).unwrap_err();
         assert!(error.to_string().contains("nothing"), "{error}");
     }

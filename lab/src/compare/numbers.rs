@@ -250,7 +250,7 @@ impl SceneNumbers {
         let bounds = scene.whole_bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
         let shown = plan.shown;
-        let field = Field::over(&scene, shown.instances());
+        let field = Field::over(&scene, shown.instances(), picture.up);
         if let Some(field) = &field {
             field.frame(&mut scene);
         }
@@ -263,7 +263,7 @@ impl SceneNumbers {
         let of_camera = [Workload::Primary, Workload::Ao, Workload::Bounce];
         let needs_hits = plan.workloads.iter().any(|workload| of_camera.contains(workload));
         ensure!(is_seen || !needs_hits, reason);
-        let first = |system: &dyn System| (plan.first)(spec, shown, system);
+        let first = |system: &dyn System| (plan.first)(spec, shown, picture.up, system);
         let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);
         Ok(Self { facts, shown, systems, ratios })

@@ -1,7 +1,7 @@
 //! All systems on one scene, in turn.
 //!
 //! ```text
-//! a turn:        first build in a new process | build, rebuild, primary, ao, bounce, random
+//! a turn:        first build in a new process | build, rebuild, primary, ao, bounce, random, near, far
 //! repetition 1:  turn of A | turn of B | ...
 //! repetition 2:  turn of A | turn of B | ...                             medians of each
 //! ```
@@ -23,6 +23,7 @@ use super::shown::Shown;
 use super::stage::Stage;
 use super::system::{Bytes, System};
 use super::workloads::{Amount, Rays, Workload};
+use crate::camera::Up;
 use crate::progress::Progress;
 
 /// The least number of first builds of each system.
@@ -40,7 +41,7 @@ pub struct Plan {
     /// The content of each scene.
     pub shown: Shown,
     /// The function that builds for the first time.
-    pub first: fn(&OsStr, Shown, &dyn System) -> Result<FirstBuild>,
+    pub first: fn(&OsStr, Shown, Option<Up>, &dyn System) -> Result<FirstBuild>,
 }
 
 /// Builds and traces with every system.
@@ -156,9 +157,9 @@ mod tests {
             workloads: Workload::ALL.to_vec(),
             amount,
             shown: Shown::Mesh,
-            first: |_, _, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
+            first: |_, _, _, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
         };
-        let first = |system: &dyn System| (plan.first)("".as_ref(), plan.shown, system);
+        let first = |system: &dyn System| (plan.first)("".as_ref(), plan.shown, None, system);
         race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 

@@ -99,7 +99,7 @@ impl<'a> Stage<'a> {
         let found = &self.hits[..expected.len()];
         run.hits = hits(found);
         run.differing = if is_peer {
-            differing_hits(expected, found, self.rays.diagonal)
+            differing_hits(expected, found, self.rays.tolerance)
         } else {
             unequal(expected, found)
         };
@@ -110,7 +110,7 @@ impl<'a> Stage<'a> {
         let found = &self.distances[..expected.len()];
         run.hits = finite(found);
         run.differing = if is_peer {
-            differing_distances(expected, found, self.rays.diagonal)
+            differing_distances(expected, found, self.rays.tolerance)
         } else {
             unequal(expected, found)
         };

@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use hgrid_core::{Config, Control, Grid, Hit, Object, Ray, Scene, Shapes};
 use serde::Serialize;
 
+use super::agreement::tolerance;
 use super::input::Input;
 use super::points::Points;
 use super::random::Random;
@@ -26,7 +27,8 @@ use crate::world::on_mesh;
 /// where the scene is a field of its instances.
 pub const AO_REACH: f64 = 0.1;
 
-/// The distance of such a ray's start from its surface, likewise: far above rounding errors, far below triangles.
+/// The distance of such a ray's start from its surface, as a part of the diagonal of the scene's box, also where the
+/// scene is a field: rounding errors grow with coordinates.
 const AO_START: f64 = 1e-5;
 
 /// The kinds of queries.
@@ -133,8 +135,8 @@ pub struct Rays {
     pub near: Points,
     /// Points far outside.
     pub far: Points,
-    /// The length of the diagonal of the scene's box.
-    pub diagonal: f64,
+    /// The largest distance between hits, and between closest points, that count as the same.
+    pub tolerance: f64,
 }
 
 impl Rays {
@@ -188,7 +190,7 @@ impl Rays {
             random: Asked::new(random_rays(bounds, amount.random_rays), closest),
             near: Points::near(&grid, diagonal, amount.near_points),
             far: Points::far(&grid, bounds, diagonal, amount.far_points),
-            diagonal,
+            tolerance: tolerance(of_mesh, diagonal),
         })
     }
 
@@ -336,7 +338,7 @@ mod tests {
             let direction = ray.direction.map(f64::from);
             assert!((dot(direction, direction) - 1.0).abs() < 1e-5);
         }
-        let reach = AO_REACH * rays.diagonal;
+        let reach = AO_REACH * diagonal_of((min, max));
         for (short, long) in ao.questions.iter().zip(&bounce.questions) {
             assert!((f64::from(short.t_max) / reach - 1.0).abs() < 1e-6);
             assert_eq!(Ray { t_max: f32::INFINITY, ..*short }, *long);
