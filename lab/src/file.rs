@@ -1,9 +1,14 @@
-//! Files that are read: what is opened can be read twice, once to recognise it and once for its content.
+//! Files that are read, and files that are written.
+//!
+//! A file that is opened can be read twice, once to recognise it and once for its content. A file that is written is
+//! complete, or it is what it was before.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
+use tempfile::NamedTempFile;
 
 /// Opens a file, and refuses folders, pipes and devices.
 ///
@@ -18,4 +23,85 @@ pub(crate) fn open(path: &Path) -> Result<File> {
         "it is a pipe or a device: write what it holds into a file, and name that"
     );
     File::open(path).context("cannot open it")
+}
+
+/// Writes a file under another name and then renames it, so that a full disk leaves the older file of its name.
+///
+/// Pipes and devices are written to as they are. So is a file in a folder where no other file can be made.
+///
+/// # Errors
+/// The errors of writing, with the file's name.
+pub(crate) fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
+    replace(path, content).with_context(|| format!("cannot write `{}`", path.display()))
+}
+
+fn replace(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    // Replace what a link leads to, not the link.
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let old = fs::metadata(&path).ok();
+    let is_file = old.as_ref().is_none_or(Metadata::is_file);
+    let Some(mut new) = is_file.then(|| beside(&path)).and_then(Result::ok) else {
+        return content(&mut File::create(path)?);
+    };
+    if let Some(old) = old {
+        // A file that may not be written to may not be replaced.
+        OpenOptions::new().write(true).open(&path)?;
+        new.as_file().set_permissions(old.permissions())?;
+    }
+    content(new.as_file_mut())?;
+    new.persist(path)?;
+    Ok(())
+}
+
+/// Makes a file in the folder of another one, with the permissions of any new file.
+fn beside(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.prefix(".hgrid-").tempfile_in(folder.unwrap_or(Path::new(".")))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    #[test]
+    fn a_file_is_whole_or_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let fails =
+            |file: &mut File| file.write_all(b"half").and(Err(io::ErrorKind::StorageFull.into()));
+        assert!(write(&path, fails).is_err() && !path.exists());
+        write(&path, |file| file.write_all(b"whole")).unwrap();
+        let error = format!("{:#}", write(&path, fails).unwrap_err());
+        assert!(error.starts_with("cannot write `") && error.contains("a`: "), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        write(&path, |file| file.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        // Nothing else is left in the folder.
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+        let folder = tempfile::tempdir().unwrap();
+        let [path, link] = ["a", "link"].map(|name| folder.path().join(name));
+        write(&path, |file| file.write_all(b"old")).unwrap();
+        // What any program's new file has.
+        let usual = folder.path().join("usual");
+        fs::write(&usual, "").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&path), mode(&usual));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        symlink("a", &link).unwrap();
+        write(&link, |file| file.write_all(b"new")).unwrap();
+        assert!(link.is_symlink() && mode(&path) & 0o777 == 0o640);
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
 }

@@ -1,16 +1,17 @@
 //! Pictures as PNG files.
 //!
 //! A check before the work tests that the file can be written, and leaves no empty file behind. The file
-//! itself is written in a single write when the picture is complete.
+//! itself is written when the picture is complete.
 
-use core::iter;
 use std::ffi::OsStr;
 use std::fs::{self, OpenOptions};
-use std::io::{Cursor, ErrorKind};
+use std::io::{Cursor, ErrorKind, Write as _};
 use std::path::{Path, is_separator};
 
 use anyhow::{Context as _, Error, Result, ensure};
 
+use crate::file;
+use crate::scene::files;
 use crate::scene::gltf::files_of;
 use crate::shade::Rgb;
 
@@ -38,15 +39,14 @@ fn is_pipe_or_device(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|what| !what.is_file() && !what.is_dir())
 }
 
-/// Refuses to overwrite the file or the two files that a scene is named by, or a buffer that they name, by a blob, a
-/// picture or results of it.
+/// Refuses to overwrite a file of a scene by a blob, a picture or results of it. Files of a scene are those that its
+/// words name, two in `A+B`, and the buffers of a glTF file.
 ///
 /// # Errors
 /// If the output is one of them.
 pub fn check_sources(output: &Path, scene: &OsStr, what: &str) -> Result<()> {
     let Ok(target) = output.canonicalize() else { return Ok(()) };
-    let two = scene.to_str().unwrap_or_default().split('+').map(OsStr::new);
-    for path in iter::once(scene).chain(two).map(Path::new) {
+    for path in files(scene) {
         let input = path.display();
         let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == target);
         ensure!(
@@ -120,9 +120,9 @@ pub fn in_folder<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> 
 /// # Errors
 /// The errors of writing the file.
 pub fn write_png(path: &Path, size: (u32, u32), pixels: &[Rgb]) -> Result<()> {
-    encode(size, pixels)
-        .and_then(|bytes| Ok(fs::write(path, bytes)?))
-        .with_context(|| format!("cannot write `{}`", path.display()))
+    let bytes =
+        encode(size, pixels).with_context(|| format!("cannot draw `{}`", path.display()))?;
+    file::write(path, |file| file.write_all(&bytes))
 }
 
 fn encode((width, height): (u32, u32), pixels: &[Rgb]) -> Result<Vec<u8>> {

@@ -3,7 +3,6 @@
 //! The file is a blob as in core/src/packed/mod.rs, or C source with its bytes: an array that a program for a
 //! microcontroller keeps in flash and opens there.
 
-use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 
 use anyhow::{Context as _, Result};
@@ -12,6 +11,7 @@ use indicatif::HumanCount;
 
 use crate::blob::Blob;
 use crate::cli::blob::PackArgs;
+use crate::file;
 use crate::image::{check_sources, check_writable};
 use crate::notices::tell;
 use crate::plural::triangles;
@@ -33,17 +33,14 @@ pub fn run(args: &PackArgs) -> Result<()> {
     let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
     let blob = pack(&scene, &config, args.density).with_context(cannot)?;
-    let written = match &args.c_array {
-        None => fs::write(&args.output, blob.bytes()),
-        Some(name) => File::create(&args.output).and_then(|file| {
-            let is_header =
-                args.output.extension().is_some_and(|ending| ending == "h" || ending == "hpp");
+    file::write(&args.output, |file| match &args.c_array {
+        None => file.write_all(blob.bytes()),
+        Some(name) => {
             let mut file = BufWriter::new(file);
-            write_c(&mut file, name, is_header, &scene.name, blob.bytes())?;
+            write_c(&mut file, name, args.is_header(), &scene.name, blob.bytes())?;
             file.flush()
-        }),
-    };
-    written.with_context(|| format!("cannot write `{}`", args.output.display()))?;
+        }
+    })?;
     let bytes = HumanCount(blob.bytes().len() as u64);
     let triangles = triangles(scene.indices.len());
     let (output, method) = (args.output.display(), args.method.name());

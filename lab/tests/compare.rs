@@ -43,6 +43,19 @@ fn first_builds_have_processes_of_their_own() {
     }
 }
 
+/// Nobody needs to read which systems are left out.
+#[cfg(all(feature = "embree", target_os = "linux"))]
+#[test]
+fn a_full_standard_error_ends_no_comparison() {
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let words = "compare procedural:knot:500 --instances 9 --size 16 --repeat 1 --methods bvh,fixed \
+         --peers embree-low --workloads primary";
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+    let output = command.args(words.split_whitespace()).stderr(full).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && text.contains("9 instances"), "{text}");
+}
+
 /// A scene that cannot be measured, and an output that takes no text, leave the numbers in the file.
 #[cfg(all(feature = "embree", target_os = "linux"))]
 #[test]

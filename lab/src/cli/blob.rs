@@ -61,24 +61,18 @@ impl PackArgs {
             method.name()
         );
         self.tuning.check("--method", &[method])?;
-        let has_ending = |endings: &[&str]| {
-            let ending = self.output.extension();
-            ending.is_some_and(|ending| {
-                endings.iter().any(|known| ending.eq_ignore_ascii_case(known))
-            })
-        };
         match &self.c_array {
             None => {
-                let is_source = has_ending(&SOURCES);
+                let is_source = self.has_ending(&SOURCES);
                 ensure!(!is_source, "`{output}` is C by its name: add --c-array NAME");
                 ensure!(
-                    self.output.extension().is_none() || has_ending(&BLOBS),
+                    self.output.extension().is_none() || self.has_ending(&BLOBS),
                     "`{output}` would be no blob by its name: name a file like x.hgrid or x.bin"
                 );
             }
             Some(name) => {
                 ensure!(
-                    has_ending(&SOURCES),
+                    self.has_ending(&SOURCES),
                     "`{output}` is not C by its name: name a file like x.c"
                 );
                 ensure!(
@@ -93,6 +87,17 @@ impl PackArgs {
             }
         }
         Ok(())
+    }
+
+    /// Returns true if the output is a C or C++ header by its name.
+    #[must_use]
+    pub fn is_header(&self) -> bool {
+        self.has_ending(&["h", "hpp"])
+    }
+
+    fn has_ending(&self, endings: &[&str]) -> bool {
+        let ending = self.output.extension();
+        ending.is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
     }
 }
 

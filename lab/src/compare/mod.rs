@@ -38,7 +38,6 @@ mod tables;
 pub mod workloads;
 
 use std::ffi::OsString;
-use std::fs;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -47,7 +46,9 @@ use clap::ValueEnum as _;
 use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
+use crate::file;
 use crate::image::{check_sources, check_writable, in_folder};
+use crate::notices::say;
 use crate::scene;
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
@@ -92,7 +93,7 @@ fn measure(args: &CompareArgs, mut systems: Vec<Box<dyn System>>) -> Result<()> 
     let keep = |comparison: &Comparison| {
         let Some(path) = &args.json else { return Ok(()) };
         let json = serde_json::to_string_pretty(comparison)? + "\n";
-        fs::write(path, json).with_context(|| format!("cannot write `{}`", path.display()))
+        file::write(path, |file| file.write_all(json.as_bytes()))
     };
     let (comparison, failed) =
         Comparison::measure(&args.scenes, &systems, &args.picture, &plan, keep)?;
@@ -142,7 +143,7 @@ fn leave_out(
          random; left out were {names}"
     );
     if !names.is_empty() {
-        writeln!(io::stderr(), "left out, because they have no {items}: {names}")?;
+        say(&format!("left out, because they have no {items}: {names}"));
     }
     Ok(())
 }
@@ -182,6 +183,8 @@ pub fn system_named(name: &str) -> Result<Box<dyn System>> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use clap::Parser as _;
 
     use super::numbers::Kind;

@@ -1,22 +1,19 @@
 //! Pseudorandom numbers, the same in every run.
 
 use crate::scene::Bounds;
+use crate::scene::noise::SplitMix64;
 use crate::vector::Vector;
 
-/// A generator of numbers from 0 to 1, which only depend on its start (`SplitMix64`).
-pub(super) struct Random(u64);
+/// A generator of numbers from 0 to 1, which only depend on its start.
+pub(super) struct Random(SplitMix64);
 
 impl Random {
     pub(super) const fn new(start: u64) -> Self {
-        Self(start)
+        Self(SplitMix64::new(start))
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are what an f64 has")]
     pub(super) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ mixed >> 31) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.next_unit()
     }
 
     /// Returns a whole number below another, or 0 if that is 0.

@@ -23,6 +23,9 @@ use crate::regions::TOO_DENSE;
 use crate::scene::Scene;
 use crate::table::{display_name, measure_diffuse, times};
 
+/// The reason why a method has no chart.
+const SAME: &str = "all densities make the same grid";
+
 /// The measurements of one scene at every density, for every method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Curves {
@@ -91,8 +94,12 @@ impl Curves {
     /// Refuses charts without a point.
     ///
     /// # Errors
-    /// If the mesh can have none of the densities.
+    /// If the mesh can have none of the densities, or all make the same grids of it.
     pub(super) fn check(&self) -> Result<()> {
+        ensure!(
+            self.curves().next().is_some(),
+            "figure 1 would show nothing, because {SAME}: name a larger scene, or densities that differ more"
+        );
         ensure!(
             self.have_points(),
             "figure 1 would show nothing, because {TOO_DENSE}: name smaller --densities"
@@ -101,15 +108,22 @@ impl Curves {
     }
 
     pub(super) fn have_points(&self) -> bool {
-        self.methods.iter().flat_map(Curve::points).next().is_some()
+        self.curves().flat_map(Curve::points).next().is_some()
     }
 
-    /// Returns a sentence about the densities that the charts do not show; nothing if they show all.
-    pub(super) fn note(&self) -> Option<String> {
-        let left_out: Vec<_> = self.methods.iter().filter_map(Curve::left_out).collect();
-        let densities = left_out.join("; ");
-        (!left_out.is_empty())
-            .then(|| format!("left out of figure 1, because {TOO_DENSE}: {densities}"))
+    /// Returns the methods that have a chart.
+    fn curves(&self) -> impl Iterator<Item = &Curve> {
+        self.methods.iter().filter(|curve| curve.is_curve())
+    }
+
+    /// Returns a line for each reason to leave methods or densities out of the charts; none if they show all.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let flat = self.methods.iter().filter(|curve| !curve.is_curve());
+        let flat: Vec<_> = flat.map(|curve| &*curve.method).collect();
+        let too_dense: Vec<_> = self.curves().filter_map(Curve::left_out).collect();
+        let reasons = [(SAME, flat.join(", ")), (TOO_DENSE, too_dense.join("; "))];
+        let reasons = reasons.into_iter().filter(|(_, what)| !what.is_empty());
+        reasons.map(|(why, what)| format!("left out of figure 1, because {why}: {what}")).collect()
     }
 }
 
@@ -152,7 +166,7 @@ const HEIGHT: u32 = 400;
 
 impl Figure<'_> {
     fn curves(&self) -> Vec<&Curve> {
-        self.0.methods.iter().filter(|curve| curve.is_curve()).collect()
+        self.0.curves().collect()
     }
 
     /// Returns the number of columns and of rows of charts.

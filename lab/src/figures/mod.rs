@@ -6,7 +6,6 @@
 mod bars;
 mod density;
 
-use std::fs;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -16,11 +15,11 @@ use plotters::prelude::RGBColor;
 use serde::Serialize;
 
 use crate::cli::FiguresArgs;
-use crate::image;
 use crate::notices::say;
 use crate::plot::{COLORS, Drawing, save, svg};
 use crate::scene;
 use crate::table::Results;
+use crate::{file, image};
 
 /// Measures, draws and writes.
 ///
@@ -38,15 +37,17 @@ fn measure(args: &FiguresArgs) -> Result<()> {
     // Before the measurement, which takes long.
     for name in ["figure1", "figure2"] {
         for ending in ["svg", "png", "json"] {
-            image::check_writable(&folder.join(name).with_extension(ending))?;
+            let path = folder.join(name).with_extension(ending);
+            for scene in args.scenes.iter().chain(&args.figure1) {
+                image::check_sources(&path, scene, "figure")?;
+            }
+            image::check_writable(&path)?;
         }
     }
     let curves = density::Curves::measure(args)?;
     curves.check()?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;
-    if let Some(note) = curves.note() {
-        say(&note);
-    }
+    curves.notes().iter().for_each(|note| say(note));
     let (results, failed) = Results::measure(&args.scenes, &args.race)?;
     write(&bars::Figure(&results), &results, folder, "figure2")?;
 
@@ -83,7 +84,7 @@ fn write(
     // The numbers first: they took long, and pictures can be drawn from them again.
     let path = folder.join(name).with_extension("json");
     let json = serde_json::to_string_pretty(numbers)? + "\n";
-    fs::write(&path, json).with_context(|| format!("cannot write `{}`", path.display()))?;
+    file::write(&path, |file| file.write_all(json.as_bytes()))?;
     save(drawing, folder, name)
 }
 
@@ -95,6 +96,8 @@ fn color_of(name: &str) -> RGBColor {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use clap::Parser as _;
 
     use super::*;

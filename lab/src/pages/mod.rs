@@ -22,9 +22,9 @@ use anyhow::{Context as _, Result, bail, ensure};
 use serde::de::DeserializeOwned;
 
 use crate::cli::ReportArgs;
-use crate::figures;
 use crate::machine::Machine;
 use crate::table::Results;
+use crate::{figures, file};
 use paper::Paper;
 
 /// The pages with tables of results.
@@ -51,7 +51,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     }
     for File { name, text } in &stale {
         let path = args.root.join(name);
-        fs::write(&path, text).with_context(|| format!("cannot write `{}`", path.display()))?;
+        file::write(&path, |file| file.write_all(text.as_bytes()))?;
         writeln!(out, "wrote {name}")?;
     }
     Ok(())

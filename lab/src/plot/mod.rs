@@ -13,10 +13,10 @@ mod axis;
 mod chart;
 mod raster;
 
-use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -25,8 +25,8 @@ pub(crate) use axis::{Scale, Stops, number};
 pub(crate) use chart::{HEADING, WORDS, Words, chart, heading};
 pub(crate) use raster::Raster;
 
-use crate::image;
 use crate::shade::Rgb;
+use crate::{file, image};
 
 /// The font of drawings, and its replacements in an SVG's reader.
 const FONT: &str = "Noto Sans, DejaVu Sans, Helvetica, Arial, sans-serif";
@@ -111,8 +111,8 @@ pub(crate) fn centred(style: &TextStyle<'static>) -> TextStyle<'static> {
 /// The errors of writing the files.
 pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<()> {
     let path = folder.join(name).with_extension("svg");
-    fs::write(&path, svg(drawing)?)
-        .with_context(|| format!("cannot write `{}`", path.display()))?;
+    let text = svg(drawing)?;
+    file::write(&path, |file| file.write_all(text.as_bytes()))?;
     let (size, pixels) = pixels(drawing)?;
     image::write_png(&path.with_extension("png"), size, &pixels)
 }
@@ -175,6 +175,8 @@ fn averages(fine: &[u8], width: u32) -> Vec<Rgb> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     /// A black square in the middle, and a word above it.

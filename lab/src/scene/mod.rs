@@ -8,7 +8,7 @@ pub mod format;
 pub(crate) mod gltf;
 mod knot;
 pub mod model;
-mod noise;
+pub(crate) mod noise;
 mod obj;
 mod packed;
 mod ply;
@@ -235,6 +235,17 @@ fn no_scene(spec: &OsStr) -> String {
 fn pair(text: &str) -> Option<(&str, &str)> {
     let pluses = || text.match_indices('+').map(|(at, _)| (&text[..at], &text[at + 1..]));
     pluses().find(|(inner, _)| Path::new(inner).is_file()).or_else(|| pluses().next())
+}
+
+/// Returns the files that the words of a scene name; for words that name no scene, the file of that name.
+pub(crate) fn files(spec: &OsStr) -> Vec<&Path> {
+    match Source::of(spec) {
+        Ok(Source::Pair(inner, outer)) => {
+            [inner, outer].into_iter().flat_map(|of| files(of.as_ref())).collect()
+        }
+        Ok(Source::Formula(_)) => Vec::new(),
+        Ok(Source::File) | Err(_) => vec![Path::new(spec)],
+    }
 }
 
 /// Looks at the words of scenes and at the starts of their files, before long work with the first of them.

@@ -76,6 +76,9 @@ fn a_blob_overwrites_none_of_its_sources() {
         assert!(said.contains("would be overwritten"), "{scene}: {said}");
     }
     folder.says("validate a.hgrid").unwrap();
+    fs::copy(folder.0.join("a.hgrid"), folder.0.join("x+y.hgrid")).unwrap();
+    let said = folder.fails("pack x+y.hgrid+a.obj -o x+y.hgrid").unwrap();
+    assert!(said.contains("`x+y.hgrid` would be overwritten"), "{said}");
     folder.says("pack a.hgrid -o b.hgrid").unwrap();
     // A glTF file names its buffer, with spaces as %20. It may have any name, and be binary.
     let json = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "b%20c.bin", "byteLength": 4 }] }"#;
@@ -457,6 +460,11 @@ fn a_blob_can_be_an_array_of_c() {
     let numbers =
         numbers.filter(|number| !number.is_empty()).map(|number| number.parse::<u8>().unwrap());
     assert!(numbers.eq(blob));
+    for name in ["a.h", "a.H", "a.HPP"] {
+        folder.says(&format!("pack a.obj -o {name} --c-array a")).unwrap();
+        let text = fs::read_to_string(folder.0.join(name)).unwrap();
+        assert!(text.contains("HGRID_ALIGNED static const"), "{name}");
+    }
 
     for (words, expected) in [
         ("pack a.obj -o a.c", "add --c-array NAME"),

@@ -77,6 +77,35 @@ fn figures_that_cannot_be_written_are_not_measured() {
     assert!(!folder.0.join("charts/figure1.svg").exists());
 }
 
+#[test]
+fn figures_overwrite_no_mesh() {
+    let folder = Folder::new("mesh").unwrap();
+    fs::write(folder.0.join("figure2.json"), "{ \"asset\": { \"version\": \"2.0\" } }").unwrap();
+    for words in ["figure2.json", "a.obj --figure1 ./figure2.json"] {
+        let output = folder.command(&format!("figures {words} -o .")).output().unwrap();
+        let expected = "figure2.json` would be overwritten by its own figure: name another file";
+        assert!(!output.status.success() && error(&output).contains(expected), "{output:?}");
+    }
+}
+
+/// Densities that make the same grids would draw a figure without charts.
+#[test]
+fn figures_need_grids_that_differ() {
+    let folder = Folder::new("same").unwrap();
+    let figures = |densities: &str| {
+        let words =
+            format!("figures a.obj --size 9 --repeat 1 --methods fixed --densities {densities}");
+        error(&folder.command(&words).output().unwrap())
+    };
+    let said = figures("4,4.001");
+    assert!(
+        said.contains("because all densities make the same grid: name a larger scene"),
+        "{said}"
+    );
+    let said = figures("4,8,4");
+    assert!(said.contains("--densities has 4 twice: name each once"), "{said}");
+}
+
 /// Writes a packed scene of two instances of a triangle.
 fn pack_scene(path: &Path) -> Result<(), Box<dyn core::error::Error>> {
     let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
