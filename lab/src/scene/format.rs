@@ -55,7 +55,12 @@ impl Format {
         let mut file = file::open(path)?;
         let mut start = Vec::new();
         file.by_ref().take(512).read_to_end(&mut start).context("cannot read it")?;
-        Self::of_content(&start, Self::named(path))
+        let (named, length) = (Self::named(path), file.metadata().context("cannot read it")?.len());
+        // Its first bytes may be any words, those of other formats, too.
+        if named == Some(Self::Stl) && stl::is_binary(&start, length) {
+            return Ok(Self::Stl);
+        }
+        Self::of_content(&start, named)
     }
 
     fn of_content(start: &[u8], named: Option<Self>) -> Result<Self> {
@@ -195,6 +200,26 @@ mod tests {
             (b"v 0 0 0", Some(Format::Obj), Format::Obj),
         ] {
             assert_eq!(Format::of_content(start, named).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn any_words_may_start_an_stl_file() {
+        let folder = tempfile::tempdir().unwrap();
+        for words in ["ply", "plywood", "OFF", "GIF89a"] {
+            let [stl, obj] = ["a.stl", "a.obj"].map(|name| folder.path().join(name));
+            let mut bytes = words.as_bytes().to_vec();
+            bytes.resize(80, b' ');
+            bytes.extend([1, 0, 0, 0]);
+            bytes.extend([0; 50]);
+            fs::write(&stl, &bytes).unwrap();
+            assert_eq!(Format::of(&stl).unwrap(), Format::Stl, "{words}");
+            let is_stl = |path| Format::of(path).is_ok_and(|format| format == Format::Stl);
+            // Another name or another length leaves the words to tell.
+            fs::write(&obj, &bytes).unwrap();
+            bytes.push(0);
+            fs::write(&stl, &bytes).unwrap();
+            assert!(!is_stl(&obj) && !is_stl(&stl), "{words}");
         }
     }
 

@@ -41,12 +41,15 @@ impl Mesh {
 
     /// Tells of each vertex whether a finite triangle uses it.
     fn is_used(&self) -> Vec<bool> {
-        let is_finite = |&vertex: &u32| {
-            let position = self.positions.get(vertex as usize);
-            position.is_some_and(|position| position.iter().all(|c| c.is_finite()))
+        let corners = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions.get(vertex as usize).copied());
+            Some([a?, b?, c?])
         };
         let mut is_used = vec![false; self.positions.len()];
-        for triangle in self.indices.iter().filter(|triangle| triangle.iter().all(is_finite)) {
+        for triangle in &self.indices {
+            if !corners(triangle).is_some_and(|corners| super::is_finite(&corners)) {
+                continue;
+            }
             for &vertex in triangle {
                 is_used[vertex as usize] = true;
             }
@@ -259,6 +262,17 @@ mod tests {
         };
         let expected = [[7.0, 0.0, -1.0], [5.0, 2.0, -1.0], [0.0; 3], [-1.0, 0.0, 0.0]];
         assert_eq!(bits(&all.positions[1..5]), bits(&expected));
+    }
+
+    #[test]
+    fn a_box_leaves_out_what_core_leaves_out() {
+        let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1e37, 0.0, 0.0]];
+        let mesh = Mesh { positions, indices: vec![[0, 1, 2], [0, 1, 3], [0, 1, 9]] };
+        let (min, max) = mesh.bounds().unwrap();
+        assert_eq!(
+            [min, max].map(|p| p.map(f32::to_bits)),
+            [[0.0; 3], [1.0, 1.0, 0.0]].map(|p: [f32; 3]| p.map(f32::to_bits))
+        );
     }
 
     #[test]

@@ -19,16 +19,13 @@ const TRIANGLE_BYTES: usize = 50;
 /// # Errors
 /// If the file is cut off, or a line of an ASCII file is malformed.
 pub(super) fn read(bytes: &[u8]) -> Result<Model> {
-    let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
-    let count = count.map(|count| u32::from_le_bytes(*count) as usize);
+    let count = count_of(bytes);
     let rest = bytes.get(HEADER_BYTES..).unwrap_or_default();
     // The header or the count of a binary file nearly always has a zero somewhere, and text has none.
     let head = bytes.get(..HEADER_BYTES).unwrap_or(bytes);
     let is_text = starts_with_solid(bytes) && !head.contains(&0);
     match count {
-        Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => {
-            Ok(binary(rest).into())
-        }
+        _ if is_binary(bytes, bytes.len() as u64) => Ok(binary(rest).into()),
         // The names of solids may be in any encoding.
         _ if is_text => Ok(ascii(&String::from_utf8_lossy(bytes))?.into()),
         // Some programs write more bytes after the last triangle.
@@ -50,6 +47,18 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model> {
         }
         None => bail!("it is not an STL file: it is too short, and does not start with `solid`"),
     }
+}
+
+/// Returns the number of triangles that the header of a binary file tells; none if there is no room for it.
+fn count_of(start: &[u8]) -> Option<usize> {
+    let count = start.get(..HEADER_BYTES)?.last_chunk()?;
+    Some(u32::from_le_bytes(*count) as usize)
+}
+
+/// Returns true if a file that starts so is exactly as long as a binary file with its number of triangles.
+pub(super) fn is_binary(start: &[u8], length: u64) -> bool {
+    let expected = |count| HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * count as u64;
+    count_of(start).is_some_and(|count| expected(count) == length)
 }
 
 fn binary(triangles: &[u8]) -> Mesh {
