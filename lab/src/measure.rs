@@ -184,7 +184,8 @@ pub fn rows(size: u16, methods: usize, repeat: u32) -> u64 {
     u64::from(size) * methods as u64 * (u64::from(repeat) + 1)
 }
 
-/// Builds and renders with every configuration in turn, `repeat` times, and counts once.
+/// Builds and renders with every configuration in turn, `repeat` times, and counts once. Stops after the first picture
+/// if it shows nothing: then there are no measurements.
 ///
 /// The function `cost` selects a ray's cost among its counters.
 ///
@@ -202,7 +203,7 @@ pub fn measure(
     let shader = Shader::new(mesh, &tiles.camera);
     let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
     let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
-    let mut hits = [Hit::MISS; TILE_RAYS];
+    let (mut hits, mut is_seen) = ([Hit::MISS; TILE_RAYS], false);
     for repetition in 1..=repeat {
         for (config, (builds, renders)) in configs.iter().zip(&mut samples) {
             let name = config.method().name();
@@ -228,6 +229,10 @@ pub fn measure(
             });
             renders.push(start.elapsed().as_secs_f64());
 
+            if !(is_seen || is_seen_by(&tiles, &grid)) {
+                return Ok(outcome);
+            }
+            is_seen = true;
             if repetition == repeat {
                 progress.set_message(&format!("{turn} building again, to count its memory"));
                 let [index, scratch] = asked;
@@ -238,7 +243,11 @@ pub fn measure(
                 if let Some(first) = outcome.measurements.first() {
                     let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
                     let pixels = counted(differ, "pixel", "pixels");
-                    ensure!(differ == 0, "{} and {name} differ in {pixels}", first.method);
+                    ensure!(
+                        differ == 0,
+                        "{} and {name} differ in {pixels}: please report this scene",
+                        first.method
+                    );
                 }
                 let samples = [&**builds, renders];
                 outcome
@@ -249,6 +258,13 @@ pub fn measure(
         }
     }
     Ok(outcome)
+}
+
+/// Returns true if a ray of the picture hits something.
+fn is_seen_by(tiles: &Tiles, grid: &Grid<'_>) -> bool {
+    let mut is_seen = false;
+    tiles.each(|rays, _| is_seen = is_seen || rays.iter().any(|ray| grid.occluded(ray)));
+    is_seen
 }
 
 /// Bytes that a build requested, and the most that it used.
@@ -378,7 +394,7 @@ pub(crate) fn median(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use hgrid_core::Method;
+    use hgrid_core::{INVALID_ID, Method};
 
     use super::*;
     use crate::camera::{Camera, Up, View};
@@ -422,6 +438,21 @@ mod tests {
             assert!((work - ratio(sum, m.rays)).abs() < 1e-9);
             assert_eq!(m.largest_ray_cost, u64::from(*costs.iter().max().unwrap()));
         }
+    }
+
+    #[test]
+    fn a_picture_of_nothing_is_taken_once() {
+        let scene = Scene::load("procedural:knot:500").unwrap();
+        let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
+        let camera = Camera::framing(([90.0; 3], [91.0; 3]), View::Front, Up::Y);
+        let threads = Threads::new(1).unwrap();
+        let subject = Subject { mesh, tiles: Tiles { camera, size: 16 }, threads: &threads };
+        let shade: Shade =
+            |_, _, hits, _| assert!(hits.iter().all(|hit| hit.primitive == INVALID_ID));
+        let mut progress = Progress::new("", 0);
+        let configs = [Config::default(); 2];
+        let outcome = measure(&subject, &configs, 3, shade, |_| 0, &mut progress).unwrap();
+        assert!(outcome.measurements.is_empty());
     }
 
     #[test]

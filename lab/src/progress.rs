@@ -22,7 +22,7 @@ pub struct Progress {
     bar: ProgressBar,
     scope: String,
     is_shown: bool,
-    /// The time at which the last line was written, from the start on.
+    /// The time from the start to the last line that was written.
     told: Cell<Duration>,
 }
 

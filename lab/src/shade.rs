@@ -56,7 +56,7 @@ impl<'a> Shader<'a> {
     /// All three slices are equally long.
     pub fn diffuse(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
         let [_, up, _] = self.axes;
-        self.shade(rays, hits, colors, |_, normal| {
+        self.shade(rays, hits, colors, |normal| {
             let key = dot(normal, self.light).max(0.0);
             let sky = 0.5 + 0.5 * dot(normal, up);
             [0, 1, 2].map(|c| KEY[c] * key + SKY[c] * sky + GROUND[c] * (1.0 - sky))
@@ -65,7 +65,7 @@ impl<'a> Shader<'a> {
 
     /// Shades normals as colours: red to the right, green up, blue toward the viewer.
     pub fn normals(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
-        self.shade(rays, hits, colors, |_, normal| {
+        self.shade(rays, hits, colors, |normal| {
             let along = self.axes.map(|axis| 0.5 + 0.5 * dot(normal, axis));
             // A screen takes the root of this.
             along.map(|part| part * part)
@@ -79,11 +79,11 @@ impl<'a> Shader<'a> {
         rays: &[Ray],
         hits: &[Hit],
         colors: &mut [Rgb],
-        surface: impl Fn(usize, [f32; 3]) -> [f32; 3],
+        surface: impl Fn([f32; 3]) -> [f32; 3],
     ) {
         debug_assert!(rays.len() == hits.len() && hits.len() == colors.len());
         let groups = rays.chunks(GROUP).zip(hits.chunks(GROUP)).zip(colors.chunks_mut(GROUP));
-        for (first, ((rays, hits), colors)) in (0..).step_by(GROUP).zip(groups) {
+        for ((rays, hits), colors) in groups {
             let mut directions = [[0.0; GROUP]; 3];
             for (lane, ray) in (0..GROUP).zip(rays) {
                 put(&mut directions, lane, ray.direction);
@@ -99,7 +99,7 @@ impl<'a> Shader<'a> {
                 for lane in 0..GROUP {
                     let (direction, normal) = (at(&directions, lane), at(&normals, lane));
                     let is_away = dot(normal, direction) > 0.0;
-                    let lit = surface(first + lane, normal.map(|c| if is_away { -c } else { c }));
+                    let lit = surface(normal.map(|c| if is_away { -c } else { c }));
                     let sky = at(&light, lane);
                     put(&mut light, lane, if seen.is_hit[lane] { lit } else { sky });
                 }

@@ -221,8 +221,7 @@ pub(crate) fn measure_diffuse(
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
     let measurements = measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements;
-    let is_seen = measurements.iter().all(|measurement| measurement.hits > 0);
-    ensure!(is_seen, unseen(&race.picture, scene, None));
+    ensure!(!measurements.is_empty(), unseen(&race.picture, scene, None));
     Ok(measurements)
 }
 
@@ -239,7 +238,7 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
 
 /// The way in which trees trace pictures, as part of a sentence.
 pub(crate) const IN_TILES: &str =
-    "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
+    "trace squares of 8 x 8 rays together; their tests and steps are those of each ray alone";
 
 /// Returns the meaning of times, as part of a sentence.
 pub(crate) fn times(repeats: u32) -> String {

@@ -12,7 +12,7 @@ use crate::blob::Blob;
 use crate::cli::blob::ValidateArgs;
 use crate::file;
 use crate::plural::{counted, triangles};
-use crate::render::seconds;
+use crate::render::duration;
 use crate::scene::Scene;
 use crate::scene::format::Format;
 
@@ -73,7 +73,7 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
         None => format!("`{file}` is not valid"),
     })?;
     let (method, triangles) = (grid.method().name(), triangles(info.triangle_count));
-    let time = seconds(start.elapsed().as_secs_f64());
+    let time = duration(start.elapsed().as_secs_f64());
     let rest = rest(&blob, &info);
     writeln!(
         io::stdout(),
@@ -109,7 +109,7 @@ fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
         .with_context(|| format!("`{file}` is not valid"))?;
     let instances = counted(scene.instance_count(), "instance", "instances");
     let shown = counted(info.triangle_count, "grid or scene", "grids and scenes");
-    let (time, rest) = (seconds(start.elapsed().as_secs_f64()), rest(blob, info));
+    let (time, rest) = (duration(start.elapsed().as_secs_f64()), rest(blob, info));
     writeln!(
         io::stdout(),
         "{file}: valid, a scene of {instances} with {shown}, proved in {time}{rest}"

@@ -71,7 +71,7 @@ pub enum View {
     Right,
     /// From +y, with -z up in the picture.
     Top,
-    /// From -y, with -z up in the picture.
+    /// From -y, with +z up in the picture.
     Bottom,
     /// From the front, the right and above.
     ThreeQuarter,

@@ -57,7 +57,8 @@ Examples:
   hgrid validate bunny.hgrid
   hgrid validate grid.bin --mesh bunny.ply   a grid that was written without its mesh
 
-The exit status is 0 if the blob is a grid of its mesh, and so answers as a loop over all triangles.";
+The exit status is 0 if the blob is a grid of its mesh. Its answers are then those of a loop over all
+triangles.";
 
 pub(super) const TABLE_EXAMPLES: &str = "\
 Examples:
@@ -68,8 +69,8 @@ Examples:
   hgrid table dragon.ply --markdown > table.md
   hgrid table dragon.ply --json > table.json     every single time, and the machine
 
-Close what else is running: the times are those of one thread, but for builds with --threads, and
-they are wall-clock times.";
+Close other programs: times are wall-clock times. One thread does all work; with --threads, several
+build.";
 
 pub(super) const FIGURES_EXAMPLES: &str = "\
 Examples:

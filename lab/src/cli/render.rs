@@ -39,8 +39,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           value_parser = whole(1..=1024_u16))]
     samples: Option<u16>,
-    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: 16 a pixel; 0 for the four
-    /// grids of the paper]
+    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: as many as make 16 a pixel, and
+    /// at least 1; 0 for the four grids of the paper]
     #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
           value_parser = whole(0..=1024_u16))]
     ao: Option<u16>,

@@ -87,6 +87,7 @@ fn numbers_that_are_not_whole_are_refused_by_their_range() {
         ("render --size 100000000000000000000", "it is no whole number from 1 to 16384"),
         ("render --threads 1.5", "it is no whole number from 1 to 64"),
         ("render --heat-top 0", "it is no whole number, 1 or more"),
+        ("render --heat-top 5000000000", "it is no whole number from 1 to 4294967295"),
         ("render --depth two", "it is no whole number from 1 to 4"),
         ("render --depth 5", "it is no whole number from 1 to 4"),
         ("render --macrocell-factor 1", "it is no whole number, 2 or more"),

@@ -45,10 +45,13 @@ impl Samples {
         self.faults.extend(faults);
     }
 
+    /// Returns the median of the page faults: of an even number, the mean of the middle two, rounded up.
     fn faults(&self) -> Option<u64> {
         let mut faults = self.faults.clone();
         faults.sort_unstable();
-        faults.get(faults.len() / 2).copied()
+        let middle = |at: usize| faults.get(at).copied();
+        let (low, high) = (middle(faults.len().checked_sub(1)? / 2)?, middle(faults.len() / 2)?);
+        Some(low + (high - low).div_ceil(2))
     }
 
     fn build(self) -> Build {
@@ -122,6 +125,28 @@ impl Record {
             index_bytes: self.bytes.index as u64,
             peak_bytes: self.bytes.peak as u64,
             runs: runs.collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn page_faults_are_medians() {
+        for (faults, expected) in [
+            (&[][..], None),
+            (&[7], Some(7)),
+            (&[900, 0, 900, 0], Some(450)),
+            (&[3, 1, 2], Some(2)),
+            (&[4, 1, 2, 1], Some(2)),
+        ] {
+            let mut samples = Samples::default();
+            for &count in faults {
+                samples.add(1.0, Some(count));
+            }
+            assert_eq!(samples.faults(), expected, "{faults:?}");
         }
     }
 }

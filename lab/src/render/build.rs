@@ -15,7 +15,7 @@ use crate::world::World;
 pub(super) struct Built {
     pub(super) seconds: f64,
     pub(super) index_bytes: usize,
-    pub(super) skipped_triangles: u32,
+    pub(super) skipped_triangles: u64,
     pub(super) instances: usize,
 }
 
@@ -49,7 +49,7 @@ fn build_mesh<T>(
     let built = Built {
         seconds,
         index_bytes: grid.blob_bytes(),
-        skipped_triangles: grid.skipped_count(),
+        skipped_triangles: grid.skipped_count().into(),
         instances: 0,
     };
     then(World::Mesh(&grid), built)
@@ -91,7 +91,7 @@ fn build_instances<T>(
     let built = Built {
         seconds,
         index_bytes: grids.iter().map(Grid::blob_bytes).sum::<usize>() + scene.blob().len(),
-        skipped_triangles: skipped.map(Grid::skipped_count).sum(),
+        skipped_triangles: skipped.map(|grid| u64::from(grid.skipped_count())).sum(),
         instances: placed.len(),
     };
     then(World::Instances(&scene), built)

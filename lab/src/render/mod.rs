@@ -20,7 +20,7 @@ use hgrid_core::{Counters, Grid};
 use self::build::{Built, build};
 use self::paint::{Seen, paint};
 use self::studio::Studio;
-pub(crate) use self::summary::seconds;
+pub(crate) use self::summary::duration;
 pub use self::summary::{Summary, Work};
 use crate::cli::Picture as View;
 use crate::cli::render::{RenderArgs, Shading};

@@ -30,7 +30,7 @@ pub struct Summary {
     /// Bytes of the grid, or of the grids and the scene of instances, without meshes.
     pub index_bytes: usize,
     /// Triangles without finite coordinates, which the grid leaves out.
-    pub skipped_triangles: u32,
+    pub skipped_triangles: u64,
     /// Pixels on each side of the picture.
     pub size: u16,
     /// Rays from the eye through each pixel.
@@ -68,7 +68,7 @@ impl fmt::Display for Summary {
         let Self { scene, method, threads, size, samples, .. } = self;
         let (triangles, vertices) =
             (triangles(scene.triangles), counted(scene.vertices, "vertex", "vertices"));
-        let loaded = seconds(self.load_seconds);
+        let loaded = duration(self.load_seconds);
         write!(f, "{}: {triangles}, {vertices}", scene.scene)?;
         match self.geometries {
             1 => {}
@@ -83,7 +83,7 @@ impl fmt::Display for Summary {
         let threads = counted(*threads, "thread", "threads");
         let bytes = HumanCount(self.index_bytes as u64);
         let each = ratio(self.index_bytes as u64, scene.triangles as u64);
-        let built = seconds(self.build_seconds);
+        let built = duration(self.build_seconds);
         write!(f, "{method}: built in {built}, {bytes} bytes, {each:.1} a triangle")?;
         match left_out(self.skipped_triangles) {
             None => writeln!(f)?,
@@ -101,7 +101,7 @@ impl fmt::Display for Summary {
             (false, 0) => {}
             (false, _) => f.write_str(", ambient occlusion")?,
         }
-        let (rays, rendered) = (counted(self.rays, "ray", "rays"), seconds(self.render_seconds));
+        let (rays, rendered) = (counted(self.rays, "ray", "rays"), duration(self.render_seconds));
         write!(f, "; {rays} in {rendered} on {threads}")?;
         if let Some(Work {
             primitive_tests_per_ray: tests,
@@ -122,7 +122,7 @@ impl fmt::Display for Summary {
 }
 
 /// Formats a time with three significant digits.
-pub(crate) fn seconds(seconds: f64) -> String {
+pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
         s if s >= 100.0 => format!("{s:.0} s"),
         s if s >= 10.0 => format!("{s:.1} s"),
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn times_read_well() {
-        let times = [123.4, 12.34, 1.234, 0.1234, 0.012_34, 0.000_123].map(seconds);
+        let times = [123.4, 12.34, 1.234, 0.1234, 0.012_34, 0.000_123].map(duration);
         assert_eq!(times, ["123 s", "12.3 s", "1.23 s", "123 ms", "12.3 ms", "0.12 ms"]);
     }
 }
