@@ -114,9 +114,13 @@ struct report : ::hgrid_report {
 };
 /// The statistics of a grid and its mesh. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
-/// The report of a refit. See `hgrid_refit_report`. Unlike `report` it does not initialise itself: wherever a refit
-/// takes one, it begins as `HGRID_REFIT_REPORT_INIT`.
-using refit_report = ::hgrid_refit_report;
+/// The report of a refit. See `hgrid_refit_report`.
+struct refit_report : ::hgrid_refit_report {
+    /// An empty report.
+    refit_report() noexcept : ::hgrid_refit_report HGRID_REFIT_REPORT_INIT {}
+    /// One that a call in C has filled.
+    refit_report(const ::hgrid_refit_report &raw) noexcept : ::hgrid_refit_report(raw) {}
+};
 /// The contents of a blob's header. See `hgrid_blob_info`.
 using blob_info = ::hgrid_blob_info;
 /// A point or a direction: x, y, z.
@@ -1551,11 +1555,10 @@ public:
     /// Gives a tree the boxes of a mesh whose vertices moved, in place; other views of it are of no use any
     /// more. After an error the grid is as it was. Errors are those of `hgrid_refit`.
     ///
-    /// `details` begins as `HGRID_REFIT_REPORT_INIT`. It becomes the report that is returned, and after an error it
-    /// says which triangle is to blame.
+    /// `details` becomes the report that is returned, and after an error it says which triangle is to blame.
     result<refit_report> refit(const mesh &of, refit_report *details = nullptr) noexcept
     {
-        refit_report own = HGRID_REFIT_REPORT_INIT;
+        refit_report own;
         refit_report &found = details != nullptr ? *details : own;
         const auto moved = view::refit(of, blob_, &found);
         if (!moved)

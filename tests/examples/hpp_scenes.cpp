@@ -259,7 +259,7 @@ void check_scenes()
                                          hgrid::as_writable_bytes(grid_index), hgrid::as_writable_bytes(scratch));
     CHECK(grid);
     const std::vector<std::array<float, 3>> lower = {{{0, 0, -2}}, {{1, 0, -2}}, {{0, 1, -2}}};
-    hgrid::refit_report costs = HGRID_REFIT_REPORT_INIT;
+    hgrid::refit_report costs;
     const auto down = hgrid::view::refit(hgrid::mesh(lower, indices), hgrid::as_writable_bytes(grid_index), &costs);
     const auto inwards = hgrid::make_ray({0.25f, 0.25f, 1}, {0, 0, -1});
     CHECK(down && down->intersect(inwards)->t == 3 && costs.cost_after > 0);
@@ -275,7 +275,7 @@ void check_scenes()
     const std::vector<std::array<float, 3>> high = {{{0, 0, 0}}, {{1, 0, 0}}, {{0, 1, 0}}, {{0, 0, 9}}};
     std::vector<std::array<std::uint32_t, 3>> pair = {{{0, 1, 2}}, {{1, 2, 3}}};
     auto of_pair = hgrid::grid::build(hgrid::mesh(high, pair));
-    hgrid::refit_report blame = HGRID_REFIT_REPORT_INIT;
+    hgrid::refit_report blame = {};
     const auto cost = of_pair->refit(hgrid::mesh(high, pair), &blame);
     CHECK(cost && cost->cost_after > 0 && blame.triangle == hgrid::invalid_id);
     CHECK(blame.cost_after >= cost->cost_after && blame.cost_after <= cost->cost_after);

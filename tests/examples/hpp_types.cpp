@@ -180,10 +180,20 @@ static void check_meshes()
 #endif
 }
 
+/* A report that was not told how it begins is one that C takes. */
+static void check_reports()
+{
+    CHECK(hgrid::report().struct_size == sizeof(hgrid_report));
+    const ::hgrid_refit_report usual = HGRID_REFIT_REPORT_INIT;
+    for (const hgrid::refit_report &report : {hgrid::refit_report(), hgrid::refit_report(usual)})
+        CHECK(report.struct_size == sizeof usual && report.triangle == hgrid::invalid_id);
+}
+
 void check_types()
 {
     check_spans();
     check_meshes();
+    check_reports();
 }
 
 int main()
