@@ -1475,7 +1475,8 @@ public:
     ///
     ///     auto grid = hgrid::grid::keep(std::move(vertices), std::move(indices));
     ///
-    /// Containers are those that a `mesh` is made of. Moving the grid does not move what it keeps.
+    /// Containers are those that a `mesh` is made of, but for spans and fields, which own nothing: the form below
+    /// takes them. Moving the grid does not move what it keeps.
     template <class Vertices, class Indices,
               std::enable_if_t<!detail::is_callable<const Indices &, const Vertices &>::value,
                                int> = 0>
@@ -1485,6 +1486,11 @@ public:
         static_assert(!std::is_lvalue_reference<Vertices>::value &&
                           !std::is_lvalue_reference<Indices>::value,
                       "the grid keeps its vertices and indices: std::move them");
+        static_assert(detail::owns<std::remove_cv_t<std::remove_reference_t<Vertices>>>::value &&
+                          detail::owns<std::remove_cv_t<std::remove_reference_t<Indices>>>::value,
+                      "spans and fields own nothing that the grid could keep: move the data in that they are of, with "
+                      "a callable that makes the mesh: hgrid::grid::keep(std::move(data), "
+                      "[](const type_of_data &kept) { return hgrid::mesh(...); })");
         struct arrays {
             Vertices vertices;
             Indices indices;

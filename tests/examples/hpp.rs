@@ -152,7 +152,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 64] = [
+const REFUSED: [(&str, &str); 66] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -171,6 +171,14 @@ const REFUSED: [(&str, &str); 64] = [
     (
         "hgrid::memory m; hgrid::grid::keep(m, [](const hgrid::memory &) { return hgrid::mesh(hgrid_mesh{}); });",
         "std::move them",
+    ),
+    (
+        "std::vector<face> f(1); hgrid::grid::keep(std::vector<float>(9), hgrid::field(f, &face::corners));",
+        "a callable that makes the mesh",
+    ),
+    (
+        "hgrid::grid::keep(hgrid::span<const float>(vertices), std::vector<unsigned>(indices));",
+        "a callable that makes the mesh",
     ),
     ("std::vector<face> f(1); hgrid::mesh m(vertices, f);", "name the field"),
     ("std::vector<short> i(3); hgrid::mesh m(vertices, i);", "or unsigned ones of 16"),
@@ -255,7 +263,7 @@ const REFUSED: [(&str, &str); 64] = [
 
 /// Lines like those of [`REFUSED`] that compile: what is referred to has a name, or is a span of what has one, or is
 /// read during the call alone.
-const ACCEPTED: [&str; 14] = [
+const ACCEPTED: [&str; 15] = [
     "hgrid::mesh m{hgrid::span<const float>(vertices), hgrid::span<const unsigned>(indices)}; m.masks(indices);",
     "hgrid::mesh m(vertices, indices); m.masks(hgrid::span<const unsigned>(indices));",
     "std::vector<hgrid::part> parts(1); static_cast<void>(hgrid::mesh::join(std::vector<hgrid::mesh>(), parts));",
@@ -279,6 +287,7 @@ const ACCEPTED: [&str; 14] = [
      static_cast<void>(hgrid::scene::open_packed(hgrid::span<const hgrid::byte>(m), m, hgrid::span<hgrid::byte>(m)));",
     "static_cast<void>(hgrid::peek(made<hgrid::memory>()));\
      static_cast<void>(hgrid::scene::view_bytes(made<hgrid::memory>()));",
+    "static_cast<void>(hgrid::grid::keep(std::array<float, 9>(), made<const std::vector<unsigned>>()));",
     "std::vector<hgrid::hit> h(1); static_cast<void>(hgrid::view().intersect_n(std::vector<hgrid::ray>(1), h, {}));",
 ];
 
