@@ -1173,8 +1173,11 @@ public:
     view() noexcept = default;
     /// A view of a grid that is about to go: give the grid a name.
     view(const grid &&) = delete;
-    /// The same.
-    view &operator=(const grid &&) = delete;
+    /// The same. A template, so that `{}` means a view of nothing.
+    template <class Grid, std::enable_if_t<!std::is_lvalue_reference<Grid>::value &&
+                                               std::is_convertible<Grid *, const grid *>::value,
+                                           int> = 0>
+    view &operator=(Grid &&) = delete;
     /// A view that was built or opened in C.
     explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
 

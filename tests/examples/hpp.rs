@@ -152,7 +152,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 66] = [
+const REFUSED: [(&str, &str); 67] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -186,6 +186,7 @@ const REFUSED: [(&str, &str); 66] = [
     ("hgrid::mesh(vertices, indices).masks(std::vector<unsigned>(1));", "delete"),
     ("hgrid::view v = *hgrid::grid::build(hgrid::mesh(vertices, indices));", "delete"),
     ("hgrid::view v; v = *hgrid::grid::build(hgrid::mesh(vertices, indices));", "delete"),
+    ("hgrid::view v; v = made<const hgrid::grid>();", "delete"),
     ("hgrid::grid g; auto v = hgrid::view::open(*g.pack());", "delete"),
     ("auto v = hgrid::view::open(std::vector<hgrid::byte>(64));", "delete"),
     (
@@ -263,7 +264,7 @@ const REFUSED: [(&str, &str); 66] = [
 
 /// Lines like those of [`REFUSED`] that compile: what is referred to has a name, or is a span of what has one, or is
 /// read during the call alone.
-const ACCEPTED: [&str; 15] = [
+const ACCEPTED: [&str; 16] = [
     "hgrid::mesh m{hgrid::span<const float>(vertices), hgrid::span<const unsigned>(indices)}; m.masks(indices);",
     "hgrid::mesh m(vertices, indices); m.masks(hgrid::span<const unsigned>(indices));",
     "std::vector<hgrid::part> parts(1); static_cast<void>(hgrid::mesh::join(std::vector<hgrid::mesh>(), parts));",
@@ -287,6 +288,7 @@ const ACCEPTED: [&str; 15] = [
      static_cast<void>(hgrid::scene::open_packed(hgrid::span<const hgrid::byte>(m), m, hgrid::span<hgrid::byte>(m)));",
     "static_cast<void>(hgrid::peek(made<hgrid::memory>()));\
      static_cast<void>(hgrid::scene::view_bytes(made<hgrid::memory>()));",
+    "hgrid::view v; v = {}; hgrid::grid g; v = g; v = made<const hgrid::grid &>(); v = hgrid::view();",
     "static_cast<void>(hgrid::grid::keep(std::array<float, 9>(), made<const std::vector<unsigned>>()));",
     "std::vector<hgrid::hit> h(1); static_cast<void>(hgrid::view().intersect_n(std::vector<hgrid::ray>(1), h, {}));",
 ];
