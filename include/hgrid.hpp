@@ -1104,7 +1104,7 @@ public:
         if (region.bytes_ == nullptr)
             return status::out_of_memory;
         region.size_ = static_cast<std::size_t>(bytes);
-        return region;
+        return result<memory>(std::move(region));
     }
     /// Takes the other one's bytes; it has none then.
     memory(memory &&other) noexcept
