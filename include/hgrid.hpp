@@ -1098,7 +1098,7 @@ public:
     static result<memory> allocate(std::uint64_t bytes) noexcept
     {
         memory region;
-        if (bytes > std::numeric_limits<std::size_t>::max() / 2)
+        if (bytes > (std::numeric_limits<std::size_t>::max)() / 2)
             return status::out_of_memory;
         region.bytes_.reset(static_cast<byte *>(aligned(static_cast<std::size_t>(bytes))));
         if (region.bytes_ == nullptr)
@@ -1590,7 +1590,7 @@ private:
         switch (static_cast<method>(how.raw_.method)) {
         case method::variable: return 96 * triangles + 4096;
         case method::recursive: return 160 * triangles + 4096;
-        default: return std::numeric_limits<std::uint64_t>::max();
+        default: return (std::numeric_limits<std::uint64_t>::max)();
         }
     }
 

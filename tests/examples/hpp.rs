@@ -117,6 +117,29 @@ fn its_own_example_prints_the_hit() {
     assert_eq!(printed(&mut Command::new(program)), "triangle 0 at t = 1\n");
 }
 
+/// The header compiles behind macros that windows.h defines.
+#[test]
+fn macros_of_windows_h_do_no_harm() {
+    let hpp = header("hgrid.hpp");
+    // The standard library of that system is written with such macros in mind; others are not.
+    let standard =
+        hpp.lines().filter(|line| line.starts_with("#include <") && !line.contains("optional"));
+    let standard: Vec<_> = standard.collect();
+    assert!(standard.len() > 5, "{standard:?}");
+    let program = format!(
+        "{}\n#define max(a, b) ((a) > (b) ? (a) : (b))\n#define min(a, b) ((a) < (b) ? (a) : (b))\n\
+         #define near\n#define far\n#define small char\n#define interface struct\n#define ERROR 0\n\
+         #include <hgrid.hpp>\nint main() {{ return hgrid::grid().blob().empty() ? 0 : 1; }}\n",
+        standard.join("\n")
+    );
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("program.cpp");
+    fs::write(&source, program).expect("a file");
+    for mut compiler in compilers("c++14") {
+        run(compiler.arg("-fsyntax-only").arg(&source));
+    }
+}
+
 /// Returns the names in a text that begin with a prefix.
 fn names(text: &str, prefix: &str) -> BTreeSet<String> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
