@@ -507,13 +507,14 @@ auto verdict_of(F &filter, std::size_t place, const hit &at, std::false_type) no
 }
 
 // Returns the answer as C takes it.
-inline ::hgrid_verdict number(verdict answer) noexcept
+template <class Answer>
+::hgrid_verdict number(Answer answer) noexcept
 {
+    // C's verdict is an integer, and as a bool it would be another one.
+    static_assert(std::is_same<Answer, verdict>::value || std::is_same<Answer, bool>::value,
+                  "a filter answers with a hgrid::verdict (not C's HGRID_ACCEPT) or a bool: a lambda says so by "
+                  "-> hgrid::verdict or -> bool");
     return static_cast<::hgrid_verdict>(answer);
-}
-inline ::hgrid_verdict number(bool counts) noexcept
-{
-    return counts ? HGRID_ACCEPT : HGRID_REJECT;
 }
 
 template <class C>

@@ -175,9 +175,22 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 67] = [
+const REFUSED: [(&str, &str); 70] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
+    (
+        "auto f = [](const hgrid::hit &) { return HGRID_ACCEPT_AND_STOP; }; hgrid::options().filter(f);",
+        "answers with a hgrid::verdict",
+    ),
+    (
+        "auto f = [](std::size_t, const hgrid::hit &) -> hgrid_verdict { return HGRID_ACCEPT_AND_STOP; };\
+         hgrid::options().filter(f);",
+        "answers with a hgrid::verdict",
+    ),
+    (
+        "auto f = [](const hgrid::scene_hit &hit) { return hit.t; }; hgrid::scene_options().filter(f);",
+        "answers with a hgrid::verdict",
+    ),
     ("hgrid::config().progress([](float) {});", "progress"),
     ("auto f = [](hgrid::task) {}; hgrid::config().parallel_for(2, f);", "std::uint32_t and a"),
     ("hgrid::mesh m(std::vector<float>(9), indices);", "give them a name"),
@@ -287,7 +300,7 @@ const REFUSED: [(&str, &str); 67] = [
 
 /// Lines like those of [`REFUSED`] that compile: what is referred to has a name, or is a span of what has one, or is
 /// read during the call alone.
-const ACCEPTED: [&str; 16] = [
+const ACCEPTED: [&str; 17] = [
     "hgrid::mesh m{hgrid::span<const float>(vertices), hgrid::span<const unsigned>(indices)}; m.masks(indices);",
     "hgrid::mesh m(vertices, indices); m.masks(hgrid::span<const unsigned>(indices));",
     "std::vector<hgrid::part> parts(1); static_cast<void>(hgrid::mesh::join(std::vector<hgrid::mesh>(), parts));",
@@ -312,6 +325,8 @@ const ACCEPTED: [&str; 16] = [
     "static_cast<void>(hgrid::peek(made<hgrid::memory>()));\
      static_cast<void>(hgrid::scene::view_bytes(made<hgrid::memory>()));",
     "hgrid::view v; v = {}; hgrid::grid g; v = g; v = made<const hgrid::grid &>(); v = hgrid::view();",
+    "const auto said = hgrid::verdict::accept; hgrid::options options;\
+     auto f = [&](const hgrid::hit &) -> const hgrid::verdict & { return said; }; options.filter(f);",
     "static_cast<void>(hgrid::grid::keep(std::array<float, 9>(), made<const std::vector<unsigned>>()));",
     "std::vector<hgrid::hit> h(1); static_cast<void>(hgrid::view().intersect_n(std::vector<hgrid::ray>(1), h, {}));",
 ];
