@@ -70,6 +70,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <memory>
@@ -714,13 +715,31 @@ struct only {
 #pragma GCC diagnostic ignored "-Wmissing-braces"
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
+#if HGRID_CPP >= 201703L
+template <class T>
+using is_aggregate = std::is_aggregate<T>;
+#else
+// Converts to everything.
+struct anything {
+    template <class T>
+    constexpr operator T() const noexcept;
+};
+// Tells whether values in braces go to members and not to a constructor.
+template <class T, class = void>
+struct is_aggregate : std::false_type {};
+template <class T>
+struct is_aggregate<T, void_t<decltype(T{anything(), anything()})>>
+    : std::integral_constant<bool, !std::is_constructible<T, anything, anything>::value &&
+                                       !std::is_constructible<T, std::initializer_list<float>>::value &&
+                                       !std::is_constructible<T, std::initializer_list<double>>::value> {};
+#endif
 // Tells whether an aggregate begins with three numbers of a type, in members of its own or in arrays and structs
 // that it begins with.
 template <class T, class Number, class = void>
 struct begins_with : std::false_type {};
 template <class T, class Number>
 struct begins_with<T, Number, void_t<decltype(T{only<Number>(), only<Number>(), only<Number>()})>>
-    : std::is_standard_layout<T> {};
+    : std::integral_constant<bool, is_aggregate<T>::value && std::is_standard_layout<T>::value> {};
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
@@ -740,6 +759,31 @@ template <class T, class Number>
 struct begins_with_xyz<T, Number, true>
     : std::integral_constant<bool, offsetof(T, x) == 0 && offsetof(T, y) == sizeof(Number) &&
                                        offsetof(T, z) == 2 * sizeof(Number)> {};
+
+// Tells whether a class has an array of numbers inside, as far as its `[]` tells: those of a const one are const, and
+// those of another one are not. Those of a span are the same in both.
+template <class T, class Number, class = void>
+struct is_array_like : std::false_type {};
+template <class T, class Number>
+struct is_array_like<T, Number,
+                     void_t<decltype(std::declval<T &>()[std::declval<int>()]),
+                            decltype(std::declval<const T &>()[std::declval<int>()])>>
+    : std::integral_constant<
+          bool, std::is_same<decltype(std::declval<T &>()[std::declval<int>()]), Number &>::value &&
+                    !std::is_same<decltype(std::declval<const T &>()[std::declval<int>()]), Number &>::value &&
+                    !std::is_polymorphic<T>::value> {};
+
+// Tells whether a class whose members are not known has nothing but three numbers, of which it is made.
+template <class T, class Number>
+struct is_three : std::integral_constant<bool, sizeof(T) == 3 * sizeof(Number) &&
+                                                   std::is_constructible<T, Number, Number, Number>::value> {};
+
+// Tells whether a vertex begins with three numbers of a type.
+template <class T, class Number>
+struct is_vertex
+    : std::integral_constant<bool, begins_with<T, Number>::value || begins_with_xyz<T, Number>::value ||
+                                       (!is_aggregate<T>::value && !has_xyz<T, Number>::value &&
+                                        (is_array_like<T, Number>::value || is_three<T, Number>::value))> {};
 
 template <class T>
 constexpr strided<const T> elements(const strided<T> &container) noexcept
@@ -761,7 +805,8 @@ public:
     /// A mesh of a container of vertices and one of indices.
     ///
     /// Vertices are structs that begin with three floats (anything may follow), classes that begin with
-    /// floats x, y, z, arrays of floats, or floats alone, three for each vertex. All else does not compile.
+    /// floats x, y, z or have floats in an array that `[]` gives, arrays of floats, or floats alone, three for
+    /// each vertex. All else does not compile.
     /// If the floats are elsewhere in the struct: `field(vertices, &vertex::position)`.
     ///
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
@@ -826,12 +871,10 @@ private:
     {
         using number = typename detail::scalar<V>::type;
         constexpr bool is_flat = std::is_same<V, float>::value && !IsField;
-        constexpr bool has_floats = std::is_same<number, float>::value || detail::begins_with<V, float>::value ||
-                                    detail::begins_with_xyz<V, float>::value;
+        constexpr bool has_floats = std::is_same<V, float>::value || detail::is_vertex<V, float>::value;
         // Some classes with floats can be made from doubles, too.
         constexpr bool is_double =
-            std::is_same<number, double>::value ||
-            (!has_floats && (detail::begins_with<V, double>::value || detail::begins_with_xyz<V, double>::value));
+            std::is_same<number, double>::value || (!has_floats && detail::is_vertex<V, double>::value);
         static_assert(!is_double, "coordinates must be float, not double: or name a field of floats");
         static_assert(is_double || std::is_same<number, float>::value || std::is_void<number>::value,
                       "the coordinates of a vertex are floats");

@@ -175,7 +175,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 70] = [
+const REFUSED: [(&str, &str); 73] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     (
@@ -203,6 +203,9 @@ const REFUSED: [(&str, &str); 70] = [
     ("std::vector<late> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<backwards> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<face> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<framed> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<numbered> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<slice> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<float> v(9); hgrid::grid::keep(v, std::vector<int>(3));", "std::move them"),
     (
         "hgrid::memory m; hgrid::grid::keep(m, [](const hgrid::memory &) { return hgrid::mesh(hgrid_mesh{}); });",
@@ -300,13 +303,17 @@ const REFUSED: [(&str, &str); 70] = [
 
 /// Lines like those of [`REFUSED`] that compile: what is referred to has a name, or is a span of what has one, or is
 /// read during the call alone.
-const ACCEPTED: [&str; 17] = [
+const ACCEPTED: [&str; 19] = [
     "hgrid::mesh m{hgrid::span<const float>(vertices), hgrid::span<const unsigned>(indices)}; m.masks(indices);",
     "hgrid::mesh m(vertices, indices); m.masks(hgrid::span<const unsigned>(indices));",
     "std::vector<hgrid::part> parts(1); static_cast<void>(hgrid::mesh::join(std::vector<hgrid::mesh>(), parts));",
     "std::vector<box> v(1); hgrid::boxes b(v, meets); b.masks(indices);",
     "std::vector<box> v(1); hgrid::boxes b(hgrid::span<const box>(v), meets); b.masks(hgrid::strided<unsigned>());",
     "accepts fixed; const accepts &same = fixed; hgrid::boxes b({}, same); static_cast<void>(b);",
+    "std::vector<unions> a(3); hgrid::mesh m(a, indices); std::vector<aligned> b(3); m = hgrid::mesh(b, indices);\
+     std::vector<unlisted> c(3); m = hgrid::mesh(c, indices); std::vector<closed> d(3); m = hgrid::mesh(d, indices);",
+    "float v[3][3] = {}; hgrid::mesh m(v, indices);\
+     std::vector<std::array<float, 7>> w(3); m = hgrid::mesh(w, indices);",
     "hgrid::memory m; static_cast<void>(hgrid::shapes::open(m, hgrid::boxes({}, meets)));",
     "hgrid::memory m; const hgrid::span<const hgrid::byte> all(m);\
      static_cast<void>(hgrid::shapes::open(all.subspan(0, 0), hgrid::boxes({}, meets)));",
@@ -352,7 +359,61 @@ struct quad { int material; unsigned corners[4]; };
 template <class T> struct of { T x, y, z; };
 struct wide { wide() : x(0), y(0), z(0) {} double x, y, z; };
 struct late { int id; float x, y, z; };
-struct backwards { backwards() : z(0), y(0), x(0) {} float z, y, x; };
+struct backwards { backwards() : z(0), y(0), x(0) {} backwards(float, float, float); float z, y, x; };
+struct framed { framed(); framed(float, float, float); int id; float at[3]; };
+struct numbered { using value_type = float; int id; float at[3]; };
+class slice {
+public:
+    using value_type = float;
+    slice();
+    slice(float *, std::size_t);
+    float *data() const { return first_; }
+    std::size_t size() const { return size_; }
+    float &operator[](std::size_t i) const { return first_[i]; }
+private:
+    float *first_;
+    std::size_t size_;
+};
+// Vectors as those of GLM, Eigen and Qt, and one that shows nothing of its floats.
+struct unions {
+    using value_type = float;
+    unions();
+    unions(float, float, float);
+    explicit unions(float);
+    float &operator[](int i);
+    const float &operator[](int i) const;
+    union { float x, r; };
+    union { float y, g; };
+    union { float z, b; };
+};
+class alignas(16) aligned {
+public:
+    using value_type = float;
+    aligned();
+    explicit aligned(int);
+    template <class X, class Y> aligned(const X &x, const Y &y);
+    aligned(const float &, const float &, const float &, const float &);
+    float &operator[](std::ptrdiff_t i) { return all_[i]; }
+    const float &operator[](std::ptrdiff_t i) const { return all_[i]; }
+private:
+    float all_[4];
+};
+class unlisted {
+public:
+    unlisted() : all_{0, 0, 0} {}
+    float &operator[](int i) { return all_[i]; }
+    float operator[](int i) const { return all_[i]; }
+private:
+    float all_[3];
+};
+class closed {
+public:
+    closed() : x_(0), y_(0), z_(0) {}
+    closed(float x, float y, float z) : x_(x), y_(y), z_(z) {}
+    float sum() const { return x_ + y_ + z_; }
+private:
+    float x_, y_, z_;
+};
 using box = std::array<float, 6>;
 struct accepts {
     template <class... T> bool operator()(const T &...) const { return true; }
