@@ -796,6 +796,17 @@ constexpr strided<const element_of<const C>> elements(const C &container) noexce
     return container;
 }
 
+// Returns the first mask as C takes it, and the stride. A call refuses a stride below the four bytes of a mask, so 1
+// marks a wrong number of masks.
+inline const void *masks_of(const strided<const std::uint32_t> &masks, std::size_t count,
+                            std::size_t &stride) noexcept
+{
+    static const std::uint32_t none = 0;
+    const bool is_one_each = masks.size() == count;
+    stride = is_one_each ? masks.stride() : 1;
+    return is_one_each ? masks.first() : &none;
+}
+
 } // namespace detail
 
 /// A description of vertices and triangles: `hgrid_mesh`. It refers to them; they stay where they are,
@@ -847,11 +858,7 @@ public:
     /// with this mesh answers `invalid_masks` (one without triangles ignores them).
     mesh &masks(strided<const std::uint32_t> masks) noexcept
     {
-        const bool is_one_each = masks.size() == raw_.triangle_count;
-        static const std::uint32_t none = 0;
-        raw_.masks = is_one_each ? masks.first() : &none;
-        // A call refuses a stride below the four bytes of a mask, so 1 marks a wrong number of masks.
-        raw_.mask_stride = is_one_each ? masks.stride() : 1;
+        raw_.masks = detail::masks_of(masks, raw_.triangle_count, raw_.mask_stride);
         return *this;
     }
     /// The mesh refers to its masks: give them a name.
@@ -1804,12 +1811,18 @@ public:
     template <class Test>
     boxes(strided<const std::array<float, 6>> all, Test &test) noexcept
     {
+        static_assert(!std::is_function<Test>::value, "put the function into a lambda");
+        static_assert(detail::is_callable<Test &, std::uint32_t, const ray &, shape_hit &>::value,
+                      "a test is called with a shape's number, a ray, and a hit to fill");
         raw_.boxes = all.first();
         raw_.box_stride = all.stride();
         raw_.count = all.size();
-        raw_.context = const_cast<void *>(static_cast<const void *>(&test));
+        raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(test)));
         raw_.test = [](void *context, std::uint32_t shape, const ::hgrid_ray *along,
                        ::hgrid_shape_hit *found) noexcept -> bool {
+            static_assert(std::is_same<std::decay_t<detail::answer_of<Test &, std::uint32_t, const ray &, shape_hit &>>,
+                                       bool>::value,
+                          "a test answers with a bool: a lambda says so by -> bool");
             return (*static_cast<Test *>(context))(shape, *along, *found);
         };
     }
@@ -1817,12 +1830,11 @@ public:
     template <class Boxes = strided<const std::array<float, 6>>, class Test,
               std::enable_if_t<!detail::stays<Boxes &&>::value || !std::is_lvalue_reference<Test>::value, int> = 0>
     boxes(Boxes &&, Test &&) = delete;
-    /// A mask for each shape.
+    /// A mask for each shape. If there are not as many masks as shapes, every call with these boxes answers
+    /// `invalid_masks` (one without shapes ignores them).
     boxes &masks(strided<const std::uint32_t> all) noexcept
     {
-        raw_.masks = all.first();
-        raw_.mask_stride = all.stride();
-        has_masks_ = all.size() == raw_.count;
+        raw_.masks = detail::masks_of(all, raw_.count, raw_.mask_stride);
         return *this;
     }
     /// Shapes refer to their masks: give them a name.
@@ -1830,12 +1842,9 @@ public:
     boxes &masks(Masks &&) = delete;
     /// The struct that C takes.
     const ::hgrid_boxes &c() const noexcept { return raw_; }
-    /// Returns true if there are as many masks as boxes.
-    bool is_sound() const noexcept { return has_masks_; }
 
 private:
     ::hgrid_boxes raw_ = HGRID_BOXES_INIT;
-    bool has_masks_ = true;
 };
 
 /// A tree over the boxes of shapes: `hgrid_shapes`, in memory that stays the caller's.
@@ -1847,8 +1856,6 @@ public:
     static result<shapes> build(const boxes &of, const config &how, span<byte> index, span<byte> scratch,
                                 report *details = nullptr) noexcept
     {
-        if (!of.is_sound())
-            return status::invalid_masks;
         shapes built;
         const ::hgrid_config raw = how.c();
         const status answer = detail::said(::hgrid_build_shapes(&of.c(), &raw, index.data(), index.size(),
@@ -1859,8 +1866,6 @@ public:
     /// Opens a blob that was built over these boxes.
     static result<shapes> open(span<const byte> blob, const boxes &of) noexcept
     {
-        if (!of.is_sound())
-            return status::invalid_masks;
         shapes opened;
         const status answer =
             detail::said(::hgrid_open_shapes(blob.data(), blob.size(), &of.c(), &opened.raw_));
@@ -1872,8 +1877,6 @@ public:
     /// Gives the tree in a blob the boxes of shapes that moved, in place, as `view::refit` does.
     static result<shapes> refit(span<byte> blob, const boxes &of, refit_report *details = nullptr) noexcept
     {
-        if (!of.is_sound())
-            return status::invalid_masks;
         shapes moved;
         const status answer = detail::said(
             ::hgrid_refit_shapes(&of.c(), blob.data(), blob.size(), &moved.raw_, details));

@@ -175,7 +175,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 73] = [
+const REFUSED: [(&str, &str); 76] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     (
@@ -288,6 +288,16 @@ const REFUSED: [(&str, &str); 73] = [
     ("std::vector<box> v(1); hgrid::boxes b(v, accepts());", "delete"),
     ("std::vector<box> v(1); hgrid::boxes b(v, made<const accepts>());", "delete"),
     ("std::vector<box> v(1); hgrid::boxes(v, meets).masks(std::vector<unsigned>(1));", "delete"),
+    ("std::vector<box> v(1); hgrid::boxes b(v, refused);", "put the function into a lambda"),
+    (
+        "std::vector<box> v(1); auto f = [](int) { return true; }; hgrid::boxes b(v, f);",
+        "a test is called with",
+    ),
+    (
+        "std::vector<box> v(1); auto f = [](unsigned, const hgrid::ray &, hgrid::shape_hit &) { return 0.5f; };\
+         hgrid::boxes b(v, f);",
+        "a test answers with a bool",
+    ),
     ("hgrid::shapes::open(made<hgrid::memory>(), hgrid::boxes({}, meets));", "delete"),
     ("hgrid::scene::build({}, std::vector<hgrid::object>(1), {}, {}, {});", "delete"),
     ("hgrid::scene::build({}, std::array<hgrid::object, 1>(), {}, {}, {}, nullptr);", "delete"),

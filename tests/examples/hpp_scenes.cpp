@@ -201,12 +201,40 @@ void check_objects_that_move()
     CHECK(is_near(outer->intersect(on_view)->t, 5));
 }
 
+// C refuses boxes without a mask for each shape, too.
+void check_masks_of_shapes()
+{
+    const std::array<std::array<float, 6>, 2> all = {{{{0, 0, 0, 1, 1, 1}}, {{2, 0, 0, 3, 1, 1}}}};
+    auto test = [](std::uint32_t, const hgrid::ray &, hgrid::shape_hit &found) {
+        found = hgrid::shape_hit{1, 0, 0};
+        return true;
+    };
+    const auto room = hgrid::as_writable_bytes(scratch), index = hgrid::as_writable_bytes(shape_index);
+    const auto ray = hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1});
+    std::vector<std::uint32_t> masks = {1, 2};
+    hgrid::boxes boxes(all, test);
+    const auto shapes = hgrid::shapes::build(boxes.masks(masks), {}, index, room);
+    CHECK(shapes && shapes->occluded(ray, hgrid::options().mask(1)));
+    CHECK(!shapes->occluded(ray, hgrid::options().mask(2)));
+    for (masks.pop_back();; masks.clear()) {
+        boxes.masks(masks);
+        CHECK(hgrid::shapes::build(boxes, {}, index, room).error() == hgrid::status::invalid_masks);
+        CHECK(hgrid::shapes::open(index, boxes).error() == hgrid::status::invalid_masks);
+        CHECK(hgrid::shapes::refit(index, boxes).error() == hgrid::status::invalid_masks);
+        hgrid_shapes raw = HGRID_SHAPES_INIT;
+        CHECK(hgrid_open_shapes(index.data(), index.size(), &boxes.c(), &raw) == HGRID_ERROR_INVALID_MASKS);
+        if (masks.empty())
+            break;
+    }
+}
+
 } // namespace
 
 void check_scenes()
 {
     check_normals();
     check_objects_that_move();
+    check_masks_of_shapes();
     // Cubes in a row; the test finds hits on their fronts.
     std::vector<ball> all;
     for (int i = 0; i < 64; i++) {
