@@ -975,6 +975,8 @@ public:
         case method::recursive: raw_ = recursive; break;
         case method::bvh: raw_ = bvh; break;
         }
+        // C refuses a number that is none of these.
+        raw_.method = static_cast<std::uint32_t>(of);
     }
 
     /// Cells for each triangle. Not for bvh.

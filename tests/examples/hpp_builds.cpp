@@ -233,6 +233,7 @@ static void check_configs()
     CHECK(bytes(method::recursive) > bytes(config(method::recursive).depth(1)));
     CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::recursive).depth(99)).error() ==
           status::invalid_depth);
+    CHECK(hgrid::grid::build(s.mesh(), static_cast<hgrid::method>(99)).error() == status::invalid_method);
 
     /* Fit half the bytes; the fitted configuration keeps the progress callback. */
     const auto plain = hgrid::grid::build(s.mesh(), hgrid::method::fixed);
