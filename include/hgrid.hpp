@@ -32,12 +32,12 @@
  *   }
  *
  * Exceptions: none are thrown, and none are needed (-fno-exceptions is fine, -fno-rtti, too). Every
- * function is noexcept. One that leaves a callable of yours ends the program, as it could not pass
- * through C.
+ * function is noexcept. An exception that leaves a callable of yours ends the program, because it cannot
+ * pass through C.
  *
  * Lifetimes: meshes, boxes, views, scenes, options and configurations refer to what they were given:
  * arrays, blobs, objects, counters, callables. All of these must have a name, so that they are still
- * there when they are used. The compiler refuses temporaries, but for those that docs/cpp.md names.
+ * there when they are used. The compiler refuses most temporaries, but not all: see docs/cpp.md.
  *
  * Threads: as in hgrid.h. Any number of threads may query one grid or view.
  *
@@ -426,8 +426,9 @@ public:
     constexpr T &operator*() & noexcept { return assert(value_), *value_; }
     /// The value, which must be there.
     constexpr const T &operator*() const & noexcept { return assert(value_), *value_; }
-    /// The value, which must be there, to move from.
-    constexpr T &&operator*() && noexcept { return assert(value_), *std::move(value_); }
+    /// The value of a result that is about to go, which must be there. It is moved out, so a reference may be bound to
+    /// it: `const auto &grid = *hgrid::grid::build(mesh);`.
+    constexpr T operator*() && noexcept { return assert(value_), *std::move(value_); }
     /// The value's members; it must be there.
     constexpr T *operator->() noexcept { return assert(value_), &*value_; }
     /// The value's members; it must be there.

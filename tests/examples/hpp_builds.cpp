@@ -93,6 +93,13 @@ static void check_grids()
         CHECK(hgrid::view::open(other.blob(), scene(2).mesh()).error() == status::mesh_mismatch);
     }
     CHECK(allocations_alive == 0);
+    {
+        /* A reference keeps what a temporary result had. */
+        STATIC_CHECK(std::is_same<decltype(*hgrid::grid::build(s.mesh())), hgrid::grid>::value);
+        const auto &named = *hgrid::grid::build(s.mesh());
+        CHECK(allocations_alive > 0 && named.occluded(down()));
+    }
+    CHECK(allocations_alive == 0);
 
     /* Errors name the triangle. */
     scene broken(1);
