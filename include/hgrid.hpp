@@ -2,7 +2,7 @@
  * hgrid for C++14 and later: hgrid.h with types that own, know their size and call lambdas. From C++17
  * on optional and byte are those of the standard library.
  *
- * It adds no code of its own to a query: each function here is the C call of the same name, and the
+ * It adds no code of its own to a query: most functions are the C call of the same name, and the
  * manual is hgrid.h. What it adds is for the programmer:
  *
  *   hgrid::grid       a built grid, by default a tree, that owns its memory, and its mesh if it is
@@ -13,6 +13,10 @@
  *   hgrid::options    the options of a query; a filter is any callable, without allocation
  *   hgrid::result     a value, or the status that says why there is none
  *   hgrid::strided    rays and hits inside your structs: hgrid::field(pixels, &pixel::ray)
+ *   hgrid::memory     bytes for an index, a scratch or a blob that free themselves
+ *   hgrid::boxes      the boxes of shapes of your own, and the test for them
+ *   hgrid::shapes     a tree of such shapes, in memory of yours
+ *   hgrid::scene      a tree of instances of grids, shapes and scenes, in memory of yours
  *
  *   #include <hgrid.hpp>
  *   #include <cstdio>
@@ -122,7 +126,8 @@ struct refit_report : ::hgrid_refit_report {
     /// One that a call in C has filled.
     refit_report(const ::hgrid_refit_report &raw) noexcept : ::hgrid_refit_report(raw) {}
 };
-/// The contents of a blob's header. See `hgrid_blob_info`.
+/// The contents of a blob's header. See `hgrid_blob_info`; its numbers are those of the enumerations here:
+/// `static_cast<hgrid::content>(info.content)`.
 using blob_info = ::hgrid_blob_info;
 /// A point or a direction: x, y, z.
 using point = std::array<float, 3>;
@@ -318,6 +323,18 @@ enum class culling : std::uint32_t {
     front = HGRID_CULL_FRONT,
 };
 
+/// What a blob is built over: `blob_info::content` is the number of one of these.
+enum class content : std::uint32_t {
+    /// The triangles of a mesh, for `view::open`: `HGRID_CONTENT_TRIANGLES`
+    triangles = HGRID_CONTENT_TRIANGLES,
+    /// Shapes, for `shapes::open`: `HGRID_CONTENT_SHAPES`
+    shapes = HGRID_CONTENT_SHAPES,
+    /// Instances, for `scene::open`: `HGRID_CONTENT_INSTANCES`
+    instances = HGRID_CONTENT_INSTANCES,
+    /// A scene with all that it shows, for `scene::open_packed`: `HGRID_CONTENT_PACKED_SCENE`
+    packed_scene = HGRID_CONTENT_PACKED_SCENE,
+};
+
 /// The answer of a filter about a hit.
 enum class verdict : ::hgrid_verdict {
     /// As if the triangle were not there: `HGRID_REJECT`
@@ -371,7 +388,7 @@ using optional = std::optional<T>;
 /// A byte: that of the standard library.
 using byte = std::byte;
 #else
-/// A value, or nothing: what C++17's `std::optional` is, for the types of this header.
+/// A value, or nothing: the part of C++17's `std::optional` that this header needs.
 template <class T>
 class optional {
 public:

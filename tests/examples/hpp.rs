@@ -151,7 +151,7 @@ fn every_status_and_every_function_of_c_is_there() {
     let (c, cpp) = (header("hgrid.h"), header("hgrid.hpp"));
     let defined = c.lines().filter_map(|line| line.strip_prefix("#define HGRID_"));
     let defined: Vec<_> = defined.filter_map(|line| line.split([' ', '(']).next()).collect();
-    for group in ["ERROR_", "METHOD_", "COHERENCE_", "CULL_"] {
+    for group in ["ERROR_", "METHOD_", "COHERENCE_", "CULL_", "CONTENT_"] {
         let of_group: Vec<_> = defined.iter().filter(|name| name.starts_with(group)).collect();
         assert!(of_group.len() > 1, "{group}");
         for name in of_group {

@@ -357,7 +357,7 @@ void check_scenes()
     CHECK(whole && whole->intersect(left)->t == 8);
     CHECK(whole->instance_of(*found).translation[2] == -7 && whole->grid_of(*found).validate_bytes() > 0);
     CHECK(hgrid::scene::open_packed(*packed, *views, hgrid::as_writable_bytes(scratch)));
-    CHECK(hgrid::peek(*packed)->content == HGRID_CONTENT_PACKED_SCENE);
+    CHECK(static_cast<hgrid::content>(hgrid::peek(*packed)->content) == hgrid::content::packed_scene);
     instances[0].object = 2;
     const auto refused = hgrid::scene::build(instances, objects, hgrid::config(),
                                              hgrid::as_writable_bytes(scene_index),
