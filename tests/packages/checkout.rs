@@ -147,3 +147,28 @@ fn a_cross_build_gets_a_static_library_for_the_target() {
     let names: Vec<_> = fs::read_dir(&lib).expect("libraries").flatten().collect();
     assert!(names.len() == 1 && names[0].file_name() == "libhgrid.a", "{names:?}");
 }
+
+/// CMake copies the library from where cargo writes it, though a target's name may have a dot.
+#[test]
+fn libraries_come_from_the_folder_that_cargo_names() {
+    if !has_cmake() {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let targets = [
+        ("thumbv8m.main-none-eabihf", "thumbv8m.main-none-eabihf"),
+        ("/boards/my.board.json", "my.board"),
+        ("x86_64-unknown-linux-gnu", "x86_64-unknown-linux-gnu"),
+    ];
+    for (place, (target, folder)) in targets.into_iter().enumerate() {
+        let build = dir.path().join(place.to_string());
+        let mut ask = cargo_cmake();
+        ask.args(options()).arg("-DHGRID_SHARED=OFF");
+        ask.arg("-DHGRID_TARGET_DIR=/made").arg(format!("-DHGRID_CARGO_TARGET={target}"));
+        let Output { status, stderr, .. } = configure(ask, root(), &build);
+        assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+        let rules = fs::read_to_string(build.join("CMakeFiles/hgrid_cargo.dir/build.make"));
+        let rules = rules.expect("the rules of make");
+        assert!(rules.contains(&format!("/made/{folder}/release/libhgrid.a")), "{rules}");
+    }
+}
