@@ -1,11 +1,17 @@
 # Rust's name of CMake's target.
 
+# clang can have Microsoft's ABI where CMake does not set MSVC.
+set(is_msvc FALSE)
+if(MSVC OR CMAKE_C_SIMULATE_ID MATCHES "^MSVC$" OR CMAKE_CXX_SIMULATE_ID MATCHES "^MSVC$")
+  set(is_msvc TRUE)
+endif()
+
 # Sets the variable to the name. It stays empty if CMake does not know enough, as for a bare machine.
 function(hgrid_rust_target variable host)
   string(TOLOWER "${CMAKE_SYSTEM_PROCESSOR}" processor)
   if(APPLE AND CMAKE_OSX_ARCHITECTURES)
     set(processor "${CMAKE_OSX_ARCHITECTURES}")
-  elseif(MSVC AND CMAKE_C_COMPILER_ARCHITECTURE_ID)
+  elseif(is_msvc AND CMAKE_C_COMPILER_ARCHITECTURE_ID)
     string(TOLOWER "${CMAKE_C_COMPILER_ARCHITECTURE_ID}" processor)
   endif()
   if(processor MATCHES "^(x86_64|amd64|x64)$")
@@ -40,7 +46,7 @@ function(hgrid_rust_target variable host)
   elseif(CMAKE_SYSTEM_NAME STREQUAL "Darwin")
     set(target "${processor}-apple-darwin")
   elseif(CMAKE_SYSTEM_NAME STREQUAL "Windows")
-    if(MSVC)
+    if(is_msvc)
       set(target "${processor}-pc-windows-msvc")
     else()
       set(target "${processor}-pc-windows-gnu")

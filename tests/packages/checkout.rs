@@ -148,6 +148,63 @@ fn a_cross_build_gets_a_static_library_for_the_target() {
     assert!(names.len() == 1 && names[0].file_name() == "libhgrid.a", "{names:?}");
 }
 
+/// What CMake knows of clang with Microsoft's ABI: MSVC is not set.
+const CLANG_ON_WINDOWS: &str = "
+set(UNIX FALSE)
+set(WIN32 TRUE)
+set(CMAKE_SYSTEM_NAME Windows)
+set(CMAKE_SYSTEM_PROCESSOR AMD64)
+set(CMAKE_C_SIMULATE_ID MSVC)
+unset(CMAKE_LIBRARY_ARCHITECTURE)
+";
+
+#[test]
+fn clang_with_the_abi_of_microsoft_gets_libraries_of_that_abi() {
+    if !has_cmake() {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let (hook, build) = (dir.path().join("hook.cmake"), dir.path().join("build"));
+    fs::write(&hook, CLANG_ON_WINDOWS).expect("a file");
+    let mut ask = cargo_cmake();
+    ask.args(options()).arg("-DHGRID_TARGET_DIR=/made");
+    ask.arg(format!("-DCMAKE_PROJECT_hgrid_INCLUDE={}", hook.display()));
+    let Output { status, stderr, .. } = configure(ask, root(), &build);
+    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+    let rules = fs::read_to_string(build.join("CMakeFiles/hgrid_cargo.dir/build.make"));
+    let rules = rules.expect("the rules of make");
+    for name in ["hgrid.lib", "hgrid.dll", "hgrid.dll.lib"] {
+        let from = format!("/made/x86_64-pc-windows-msvc/release/{name} ");
+        assert!(rules.contains(&from), "{from}\n{rules}");
+    }
+    // rustc calls Microsoft's linker itself.
+    assert!(!rules.contains("_LINKER="), "{rules}");
+
+    // An installed package names the import library of that ABI.
+    let prefix = dir.path().join("prefix");
+    for name in ["bin/hgrid.dll", "lib/hgrid.lib", "lib/hgrid.dll.lib", "lib/libhgrid.dll.a"] {
+        let path = prefix.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        fs::write(path, "").expect("a file");
+    }
+    let package = prefix.join("share/cmake/hgrid");
+    fs::create_dir_all(&package).expect("a folder");
+    let config = root().join("capi/cmake/hgrid-config.cmake");
+    fs::copy(config, package.join("hgrid-config.cmake")).expect("a copy");
+    let lists = format!(
+        "cmake_minimum_required(VERSION 3.16)\nproject(user C)\n{CLANG_ON_WINDOWS}\
+         find_package(hgrid REQUIRED)\n\
+         get_target_property(import hgrid::hgrid IMPORTED_IMPLIB)\nmessage(\"import ${{import}}\")\n"
+    );
+    fs::write(dir.path().join("CMakeLists.txt"), lists).expect("a file");
+    let mut ask = cmake();
+    ask.arg(format!("-Dhgrid_DIR={}", package.display()));
+    let Output { status, stderr, .. } = configure(ask, dir.path(), &dir.path().join("used"));
+    let said = String::from_utf8_lossy(&stderr);
+    let import = format!("import {}\n", prefix.join("lib/hgrid.dll.lib").display());
+    assert!(status.success() && said.contains(&import), "{said}");
+}
+
 /// CMake copies the library from where cargo writes it, though a target's name may have a dot.
 #[test]
 fn libraries_come_from_the_folder_that_cargo_names() {
