@@ -10,6 +10,9 @@ get_filename_component(_hgrid_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLU
 
 # The system's usual folders: cargo cinstall puts libraries into one of them.
 set(_hgrid_libdirs "lib/${CMAKE_LIBRARY_ARCHITECTURE}" lib64 lib)
+if(CMAKE_SIZEOF_VOID_P EQUAL 4)
+  list(REMOVE_ITEM _hgrid_libdirs lib64)
+endif()
 set(_hgrid_includedir include)
 set(_hgrid_definitions "")
 # An install by CMake and an archive say where they put things, and whether hgrid_create is there.

@@ -89,6 +89,31 @@ fn a_project_finds_libraries_wherever_they_lie() {
     }
 }
 
+/// Where lib64 has the libraries of one machine and lib those of another, a program for 32 bits gets its own.
+#[test]
+fn a_project_for_32_bits_takes_no_libraries_for_64() {
+    if !has_cmake() {
+        return;
+    }
+    let (temporary, prefix) = laid_out("lib64");
+    let ask = |build: &str| {
+        let lists = "cmake_minimum_required(VERSION 3.16)\nproject(narrow C)\n\
+                     set(CMAKE_SIZEOF_VOID_P 4)\nfind_package(hgrid REQUIRED)\n\
+                     get_target_property(at hgrid::static IMPORTED_LOCATION)\nmessage(\"at ${at}\")\n";
+        fs::write(temporary.path().join("CMakeLists.txt"), lists).expect("a file");
+        let dir = temporary.path();
+        let Output { stderr, .. } = configure_with(cmake(), dir, &prefix.dir, &dir.join(build));
+        String::from_utf8(stderr).expect("text")
+    };
+    let said = ask("without");
+    assert!(said.contains("there is no hgrid library beneath"), "{said}");
+    let narrow = prefix.dir.join("lib/libhgrid.a");
+    fs::create_dir(prefix.dir.join("lib")).expect("a folder");
+    fs::copy(prefix.lib.join("libhgrid.a"), &narrow).expect("a copy");
+    let said = ask("with");
+    assert!(said.contains(&format!("at {}\n", narrow.display())), "{said}");
+}
+
 /// A project that prints which versions and targets it found.
 const PROBE: &str = r#"
 cmake_minimum_required(VERSION 3.19)
