@@ -103,8 +103,8 @@
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
- * With one level and fixed, a build knows the exact size of the index before it writes. With the other
- * methods the size shows only while the index is written: hgrid_sizes with scratch returns it in
+ * With one level and fixed, a build knows the exact size of the index before it writes. The other
+ * methods learn the size while they write the index: hgrid_sizes with scratch returns it in
  * advance, and after HGRID_ERROR_INDEX_TOO_SMALL the former content of the index is lost.
  *
  * A library may be built with fewer methods, to be smaller. hgrid_has_method tells which it has; calls
@@ -136,7 +136,8 @@
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
  * valid during the call. These need no alignment: positions, indices, masks and boxes; the rays and
  * answers of hgrid_intersect_n, hgrid_occluded_n, hgrid_occluder_n and their like for shapes and scenes; the
- * bytes that hgrid_peek looks at; all scratch but that of builds, hgrid_sizes and hgrid_fit. All else does.
+ * bytes that hgrid_peek looks at; all scratch but that of builds, hgrid_sizes and hgrid_fit. Every other
+ * pointer must be aligned.
  * Regions, blobs, positions, indices, masks and boxes point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT or, by a query that returns no status, as a miss. Outputs come last, those of
@@ -485,8 +486,8 @@ typedef struct hgrid_part {
 /**
  * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
  *
- * The arrays are read where they lie, never copied and never changed, and not one byte behind the
- * last element's own bytes. They need no alignment, so all may be fields of the caller's structs. The
+ * The arrays are read where they lie, never copied and never changed. The library reads nothing behind the
+ * numbers of the last element. They need no alignment, so all may be fields of the caller's structs. The
  * bytes between two vertices may be read, and have no influence. Nobody may write them during a call: so
  * a batch's answers may not lie there.
  *
@@ -1500,8 +1501,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_OVERLAP -4
 
 /**
- * The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `hgrid_pack_scene` and
- * `hgrid_open_packed_scene`, where it is the room or the views, `bytes` says it.
+ * The index is too small, or the room for a packed blob or for views. The report says how many bytes it needs.
+ * `hgrid_pack`, `hgrid_pack_scene` and `hgrid_open_packed_scene` have no report: they write the number to `bytes`.
  *
  * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
  * methods the grid was written as far as it went, so the index may hold anything.
@@ -1509,7 +1510,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INDEX_TOO_SMALL -10
 
 /**
- * The scratch is too small. The report says how many bytes it needs, or, where a call has none, its description.
+ * The scratch is too small. The report says how many bytes it needs. If the call has no report, its description says
+ * how many.
  */
 #define HGRID_ERROR_SCRATCH_TOO_SMALL -11
 
@@ -1556,8 +1558,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_MASKS -26
 
 /**
- * The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has
- * arrays, too; or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+ * The parts are wrong: `hgrid_join` did not write them, or wrote them for other counts, or the mesh has arrays as
+ * well. From `hgrid_join`: a mesh is joined itself, or the meshes or their vertices are too many.
  */
 #define HGRID_ERROR_INVALID_PARTS -27
 
@@ -1761,9 +1763,9 @@ hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
  * lie: O(1), nothing is looked at.
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
- * a little; with bvh and `tasks` above 1 the scratch is larger. How much more than enough it is depends on the
- * method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too large to be of
- * use.
+ * a little; with bvh and `tasks` above 1 the scratch is larger. The bound exceeds the need by a factor that
+ * depends on the method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too
+ * large to be of use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1839,7 +1841,7 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * afterwards.
  *
  * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
- * the same as `fitted`, which is initialised before in either case. `report` may be NULL,
+ * the same as `fitted`. Initialise `fitted` before the call, even if it is `config`. `report` may be NULL,
  * and so may `scratch` if its size is 0.
  *
  * Returns `HGRID_OK`, and the report says what the fitted grid takes; or
@@ -2097,9 +2099,10 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * Tells where a ray met the mesh, which way the triangle faces there, and where rays start that leave
  * it.
  *
- * `hit` is what a query has found for `ray`, of which the direction tells the side. Returns true and writes `surface`;
+ * `hit` is what a query has found for `ray`. The ray's direction tells the side. Returns true and writes `surface`;
  * or returns false and writes nothing: the hit names no triangle (as that of a miss), the ray has no direction, the
- * view is one of zeros, or a pointer is NULL, which none may be. Takes about as long as a triangle test in `double`.
+ * view is one of zeros, or a pointer is NULL. No pointer may be NULL. Takes about as long as a triangle test in
+ * `double`.
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
  * `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need

@@ -74,9 +74,9 @@ pub unsafe extern "C" fn hgrid_join(
 /// lie: O(1), nothing is looked at.
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
-/// a little; with bvh and `tasks` above 1 the scratch is larger. How much more than enough it is depends on the
-/// method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too large to be of
-/// use.
+/// a little; with bvh and `tasks` above 1 the scratch is larger. The bound exceeds the need by a factor that
+/// depends on the method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too
+/// large to be of use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -182,7 +182,7 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// afterwards.
 ///
 /// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
-/// the same as `fitted`, which is initialised before in either case. `report` may be NULL,
+/// the same as `fitted`. Initialise `fitted` before the call, even if it is `config`. `report` may be NULL,
 /// and so may `scratch` if its size is 0.
 ///
 /// Returns `HGRID_OK`, and the report says what the fitted grid takes; or

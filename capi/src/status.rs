@@ -32,14 +32,15 @@ pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 /// overwritten so that more scenes stand inside one another than `HGRID_MAX_NESTING`.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
-/// The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `hgrid_pack_scene` and
-/// `hgrid_open_packed_scene`, where it is the room or the views, `bytes` says it.
+/// The index is too small, or the room for a packed blob or for views. The report says how many bytes it needs.
+/// `hgrid_pack`, `hgrid_pack_scene` and `hgrid_open_packed_scene` have no report: they write the number to `bytes`.
 ///
 /// With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
 /// methods the grid was written as far as it went, so the index may hold anything.
 pub const HGRID_ERROR_INDEX_TOO_SMALL: hgrid_status = -10;
 
-/// The scratch is too small. The report says how many bytes it needs, or, where a call has none, its description.
+/// The scratch is too small. The report says how many bytes it needs. If the call has no report, its description says
+/// how many.
 pub const HGRID_ERROR_SCRATCH_TOO_SMALL: hgrid_status = -11;
 
 /// The allocator has no more memory. The report says how many bytes index and scratch need.
@@ -68,8 +69,8 @@ pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 /// The mask stride is below 4 bytes, or the masks do not fit into memory.
 pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
 
-/// The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has
-/// arrays, too; or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+/// The parts are wrong: `hgrid_join` did not write them, or wrote them for other counts, or the mesh has arrays as
+/// well. From `hgrid_join`: a mesh is joined itself, or the meshes or their vertices are too many.
 pub const HGRID_ERROR_INVALID_PARTS: hgrid_status = -27;
 
 /// The configuration's `method` is unknown to this version, or, for shapes and scenes, not `HGRID_METHOD_BVH`.

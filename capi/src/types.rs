@@ -129,8 +129,8 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 
 /// A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
 ///
-/// The arrays are read where they lie, never copied and never changed, and not one byte behind the
-/// last element's own bytes. They need no alignment, so all may be fields of the caller's structs. The
+/// The arrays are read where they lie, never copied and never changed. The library reads nothing behind the
+/// numbers of the last element. They need no alignment, so all may be fields of the caller's structs. The
 /// bytes between two vertices may be read, and have no influence. Nobody may write them during a call: so
 /// a batch's answers may not lie there.
 ///
