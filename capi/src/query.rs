@@ -219,8 +219,7 @@ pub unsafe extern "C" fn hgrid_closest_point(
 ///
 /// `hit` is what a query has found for `ray`. The ray's direction tells the side. Returns true and writes `surface`;
 /// or returns false and writes nothing: the hit names no triangle (as that of a miss), the ray has no direction, the
-/// view is one of zeros, or a pointer is NULL. No pointer may be NULL. Takes about as long as a triangle test in
-/// `double`.
+/// view is one of zeros, or a pointer is NULL. Takes about as long as a triangle test in `double`.
 ///
 /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
 /// `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
