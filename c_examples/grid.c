@@ -32,23 +32,23 @@ hgrid_mesh mesh_of(const scene *s)
     return mesh;
 }
 
-/* Returns true if a method knows the size of its index before it writes it. */
-static bool is_planned(const hgrid_config *config)
+/* Returns true if the bound of a method's index is far more than a mesh needs. */
+static bool has_loose_bound(const hgrid_config *config)
 {
-    return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
+    return config->method == HGRID_METHOD_VARIABLE || config->method == HGRID_METHOD_RECURSIVE;
 }
 
 /* Computes and allocates the memory of the grid; returns the scratch.
  *
  * Without scratch, hgrid_sizes returns a bound of the index, not its exact size; pages that are never
- * touched cost nothing. For methods that find their size while they write, the bound is far too large.
- * So hgrid_sizes is called again for them, with scratch, for up to the time of a build. */
+ * touched cost nothing. For two methods the bound is far too large. So hgrid_sizes is called again for
+ * them, with scratch, which takes up to the time of a build. */
 static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, region *index)
 {
     hgrid_report report = HGRID_REPORT_INIT;
     check(hgrid_sizes(mesh, config, NULL, 0, &report), &report);
     const region scratch = allocate_region(report.scratch_bytes);
-    if (!is_planned(config))
+    if (has_loose_bound(config))
         check(hgrid_sizes(mesh, config, scratch.start, scratch.bytes, &report), &report);
     *index = allocate_region(report.index_bytes);
     return scratch;

@@ -124,8 +124,8 @@ static void draw_legend(const sheet *s, int top, uint32_t most, const char *name
             put(s, x, y, colour);
         }
     char half[16], end[16];
-    sprintf(half, "%lu", (unsigned long)(most / 2));
-    sprintf(end, "%lu+", (unsigned long)most);
+    snprintf(half, sizeof half, "%lu", (unsigned long)(most / 2));
+    snprintf(end, sizeof end, "%lu+", (unsigned long)most);
     write_text(s, "0", left, bar_end + gap);
     write_text(s, half, (left + right - width_of(s, half)) / 2, bar_end + gap);
     write_text(s, end, right - width_of(s, end), bar_end + gap);

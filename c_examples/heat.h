@@ -8,8 +8,8 @@
 /* Writes and closes the file. A bar is drawn below pictures that are wide enough for its numbers:
  *
  *     +-----------------------+
- *     |        picture        |   The scale ends at a round number no less than what 99 of 100
- *     +-----------------------+   pixels take: a few along an edge must not darken the picture.
+ *     |        picture        |   At least 99 of 100 pixels are on the scale, which ends at a
+ *     +-----------------------+   round number. A few costly pixels would darken all others.
  *     | TESTS                 |
  *     | [dark ........ light] |
  *     | 0        30       60+ |

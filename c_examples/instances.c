@@ -116,6 +116,8 @@ static void trace(const hgrid_scene *field, pixel tile[TILE * TILE])
 int main(int count, char **words)
 {
     const char *path = count > 1 ? words[1] : "instances.ppm";
+    if (count > 2 || path[0] == '-')
+        fail("the only word it takes is the name of the picture: instances FILE.ppm");
     FILE *file = open_picture(path);
     scene knot = make_knot();
     const hgrid_mesh mesh = mesh_of(&knot);

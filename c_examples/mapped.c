@@ -71,6 +71,8 @@ static mapped_options parse(int count, char **words)
     }
     if (o.grid_file == NULL)
         fail("where may the grid go? mapped GRID_FILE, a file that does not exist yet");
+    refuse_same(o.input, o.output);
+    refuse_same(o.grid_file, o.output);
     return o;
 }
 

@@ -56,6 +56,7 @@ static mpi_options parse(int count, char **words)
         else
             o.input = word;
     }
+    refuse_same(o.input, o.output);
     return o;
 }
 
@@ -145,17 +146,14 @@ static unsigned char *allocate_picture(size_t bytes)
 
 /* --- the program ----------------------------------------------------------------------------- */
 
-/* Loads and builds at rank 0, before the other ranks have work. */
-static shared_grid build(const mpi_options *o)
+/* Builds at rank 0, before the other ranks have work. */
+static void build(shared_grid *g)
 {
-    shared_grid g;
-    g.scene = load_scene(o->input);
-    const hgrid_mesh mesh = mesh_of(&g.scene);
+    const hgrid_mesh mesh = mesh_of(&g->scene);
     const hgrid_config config = HGRID_CONFIG_INIT;
     const built_grid b = build_grid(&mesh, &config, 1, NULL);
-    g.blob = b.index;
-    g.blob.bytes = (size_t)b.report.index_bytes;
-    return g;
+    g->blob = b.index;
+    g->blob.bytes = (size_t)b.report.index_bytes;
 }
 
 int main(int count, char **words)
@@ -175,8 +173,9 @@ int main(int count, char **words)
     FILE *output = NULL;
     if (rank == 0) {
         o = parse(count, words);
+        g.scene = load_scene(o.input);
         output = open_picture(o.output);
-        g = build(&o);
+        build(&g);
     }
     broadcast(&o.size, sizeof o.size);
     share_grid(rank, &g);

@@ -52,6 +52,12 @@ int parse_count(const char *option, const char *value, int least, int most)
     return (int)number;
 }
 
+void refuse_same(const char *read, const char *written)
+{
+    if (read != NULL && strcmp(read, written) == 0)
+        fail("%s is read and would be overwritten: name another file", read);
+}
+
 static float parse_number(const char *option, const char *value)
 {
     char *end;
@@ -116,6 +122,7 @@ options parse_options(int count, char **words)
             o.input = word;
         }
     }
+    refuse_same(o.input, o.output);
     if (o.density > 0 && METHODS[o.method].config.method == HGRID_METHOD_BVH)
         fail("--method %s has no density: leave out --density", METHODS[o.method].name);
     return o;

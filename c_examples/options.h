@@ -29,4 +29,7 @@ const char *value_of(int count, char **words, int *i);
 /* Returns the value of an option as a whole number from `least` to `most`; ends the program if it is none. */
 int parse_count(const char *option, const char *value, int least, int most);
 
+/* Ends the program if a file that is read, or NULL, has the name of one that is written. */
+void refuse_same(const char *read, const char *written);
+
 #endif

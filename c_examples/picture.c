@@ -2,13 +2,15 @@
 
 #include "memory.h"
 
+#include <errno.h>
 #include <stdbool.h>
+#include <string.h>
 
 FILE *open_picture(const char *path)
 {
     FILE *file = fopen(path, "wb");
     if (file == NULL)
-        fail("%s: cannot be written", path);
+        fail("%s: cannot be written: %s", path, strerror(errno));
     return file;
 }
 

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* Opens the file before the work starts, so that a wrong name fails at once. */
+/* Opens a file. Call it before long work, so that a wrong name fails at once. */
 FILE *open_picture(const char *path);
 
 /* Writes and closes the file. */

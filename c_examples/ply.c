@@ -8,6 +8,7 @@
 #include "memory.h"
 #include "scene.h"
 
+#include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -90,22 +91,35 @@ static void read_element(ply *p, const char *line)
     p->element_count++;
 }
 
+/* Reads a line, or the start of a longer one, without its end. Returns false at the end of the file. */
+static bool read_line(FILE *file, char line[LINE])
+{
+    if (fgets(line, LINE, file) == NULL)
+        return false;
+    if (strchr(line, '\n') == NULL)
+        for (int letter = 0; letter != '\n' && letter != EOF;)
+            letter = getc(file);
+    line[strcspn(line, "\r\n")] = '\0';
+    return true;
+}
+
 static void read_header(ply *p)
 {
     char line[LINE], format[WORD] = "";
     bool is_first = true;
-    while (fgets(line, sizeof line, p->file) != NULL) {
-        line[strcspn(line, "\r\n")] = '\0';
-        if (is_first && strcmp(line, "ply") != 0)
+    while (read_line(p->file, line)) {
+        char word[WORD] = "";
+        sscanf(line, "%31s", word);
+        if (is_first && strcmp(word, "ply") != 0)
             fail("%s: not a PLY file", p->path);
         is_first = false;
-        if (strncmp(line, "format ", 7) == 0)
+        if (strcmp(word, "format") == 0)
             sscanf(line, "format %31s", format);
-        else if (strncmp(line, "element ", 8) == 0)
+        else if (strcmp(word, "element") == 0)
             read_element(p, line);
-        else if (strncmp(line, "property ", 9) == 0 && p->element_count > 0)
+        else if (strcmp(word, "property") == 0 && p->element_count > 0)
             read_property(p, &p->elements[p->element_count - 1], line);
-        else if (strcmp(line, "end_header") == 0) {
+        else if (strcmp(word, "end_header") == 0) {
             p->is_ascii = strcmp(format, "ascii") == 0;
             if (!p->is_ascii && strcmp(format, "binary_little_endian") != 0)
                 fail("%s: the format is `%s`: convert it to binary_little_endian or ascii", p->path,
@@ -113,6 +127,8 @@ static void read_header(ply *p)
             return;
         }
     }
+    if (ferror(p->file))
+        fail("%s: cannot be read: %s", p->path, strerror(errno));
     fail("%s: %s", p->path, is_first ? "not a PLY file: it is empty" : "no end_header line");
 }
 
@@ -230,7 +246,7 @@ static void read_polygon(const ply *p, const property *from, const element *e, s
     uint32_t first = 0, last = 0;
     for (size_t i = 0; i < corners; i++) {
         const double number = read_number(p, from->item, e, index);
-        /* An invalid number becomes an index that hgrid refuses, with its triangle. */
+        /* hgrid refuses a mesh with this index, and names the triangle. */
         const bool is_number = number >= 0 && number < UINT32_MAX;
         const uint32_t corner = is_number ? (uint32_t)number : UINT32_MAX;
         if (i == 0)
@@ -241,14 +257,30 @@ static void read_polygon(const ply *p, const property *from, const element *e, s
     }
 }
 
+/* Returns true for the list of a polygon's corners. */
+static bool has_corners(const property *from)
+{
+    return from->count != NO_TYPE && (strcmp(from->name, "vertex_indices") == 0 ||
+                                      strcmp(from->name, "vertex_index") == 0);
+}
+
+/* Returns true if faces have lists of corners, even if there is no face. */
+static bool has_triangles(const ply *p)
+{
+    for (int i = 0; i < p->element_count; i++)
+        for (int j = 0; j < p->elements[i].property_count; j++)
+            if (strcmp(p->elements[i].name, "face") == 0 && has_corners(&p->elements[i].properties[j]))
+                return true;
+    return false;
+}
+
 static void read_faces(const ply *p, const element *e, scene *s)
 {
     size_t room = s->triangle_count;
     for (size_t index = 0; index < e->count; index++)
         for (int i = 0; i < e->property_count; i++) {
             const property *from = &e->properties[i];
-            if (from->count != NO_TYPE && (strcmp(from->name, "vertex_indices") == 0 ||
-                                           strcmp(from->name, "vertex_index") == 0))
+            if (has_corners(from))
                 read_polygon(p, from, e, index, s, &room);
             else
                 skip(p, from, e, index);
@@ -262,8 +294,10 @@ scene load_ply(const char *path)
     p.path = path;
     p.file = fopen(path, "rb");
     if (p.file == NULL)
-        fail("%s: cannot be opened", path);
+        fail("%s: cannot be opened: %s", path, strerror(errno));
     read_header(&p);
+    if (!has_triangles(&p))
+        fail("%s: no triangles: it needs an element `face` with a list `vertex_indices`", path);
     for (int i = 0; i < p.element_count; i++) {
         const element *e = &p.elements[i];
         if (strcmp(e->name, "vertex") == 0)

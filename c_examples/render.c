@@ -179,8 +179,9 @@ static int even_bits(int number)
     return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4) | (number >> 3 & 8);
 }
 
-/* The rays of a tile in the order that hgrid_intersect_n likes best: each sixteen are a square, each 64,
-   too, and each 128 are two of these side by side. At the right and lower edge a tile may be smaller. */
+/* Makes the rays of a tile in the order that hgrid_intersect_n likes best. Every 16 rays form a square of
+   pixels, and so do every 64. Every 128 form two squares of 64 side by side. At the right and lower edge a
+   tile may be smaller. */
 static size_t aim(const shared *s, size_t number, sample *tile)
 {
     const picture_job *job = s->job;

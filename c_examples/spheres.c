@@ -97,6 +97,8 @@ static double look(const hgrid_shapes *shapes, const sphere *all, const hgrid_ra
 int main(int count, char **words)
 {
     const char *path = count > 1 ? words[1] : "spheres.ppm";
+    if (count > 2 || path[0] == '-')
+        fail("the only word it takes is the name of the picture: spheres FILE.ppm");
     FILE *file = open_picture(path);
     sphere *all = (sphere *)allocate(COUNT, sizeof *all);
     make_spheres(all);

@@ -22,9 +22,13 @@ void tell(const char *name, const char *unit, uint32_t ticks_before, uint32_t co
 /* Adds the words of a hit to an FNV-1a sum. */
 static uint64_t add(uint64_t sum, const hgrid_hit *hit)
 {
-    const uint32_t *word = (const uint32_t *)(const void *)hit;
-    for (size_t i = 0; i < sizeof *hit / sizeof *word; i++)
-        sum = (sum ^ word[i]) * 0x100000001b3u;
+    union {
+        hgrid_hit hit;
+        uint32_t words[sizeof(hgrid_hit) / sizeof(uint32_t)];
+    } both;
+    both.hit = *hit;
+    for (size_t i = 0; i < sizeof both.words / sizeof *both.words; i++)
+        sum = (sum ^ both.words[i]) * 0x100000001b3u;
     return sum;
 }
 

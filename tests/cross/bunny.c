@@ -113,6 +113,8 @@ int main(int argc, char **argv)
         fread(indices, 12, counts[1], file) != counts[1] || prepare(counts[0], counts[1]) != 0)
         return 1;
     const double building = least(build), tracing = least(trace);
+    if (building < 0 || tracing < 0)
+        return 1;
     printf("%f %f %u\n", building, tracing, (unsigned)sum());
     return 0;
 }

@@ -56,8 +56,14 @@ fn bad_arguments_are_refused() {
         (&["--fast"], "unknown option --fast: raytracer --help names all of them"),
         (&["-h"], "unknown option -h: raytracer --help names all of them"),
         (&["a.ply", "b.ply"], "one scene at a time: a.ply or b.ply?"),
-        (&["no/such/file.ply"], "no/such/file.ply: cannot be opened"),
-        (&["--size", "4", "-o", "no/such/folder/a.ppm"], "no/such/folder/a.ppm: cannot be written"),
+        (&["a.ply", "-o", "a.ply"], "a.ply is read and would be overwritten: name another file"),
+        (&["no/such/file.ply"], "no/such/file.ply: cannot be opened: No such file"),
+        (
+            &["--size", "4", "-o", "no/such/folder/a.ppm"],
+            "no/such/folder/a.ppm: cannot be written: No such file",
+        ),
+        #[cfg(target_os = "linux")]
+        (&["/tmp"], "/tmp: cannot be read: Is a directory"),
     ] {
         let said = refusal(watched_raytracer().current_dir(dir.path()).args(words));
         assert!(said.contains(message), "{words:?}: {said}");
@@ -89,6 +95,7 @@ fn bad_files_are_refused_with_the_reason() {
         (replaced("element face 7", "element face many"), "cannot read `element face many`"),
         (replaced("property int id", "property integer id"), "unknown type in `property integer"),
         (replaced("float y", "float w"), "the vertices have no x, y, z"),
+        (replaced("element face 7", "element side 7"), "no triangles: it needs an element `face`"),
         (replaced("5 0 1 5 8 4", "5 0 1 5 8 door"), "has no number, in face 0 of 7"),
         (replaced("5 0 1 5 8 4", "-5 0 1 5 8 4"), "a list of length -5 in face 0"),
     ] {

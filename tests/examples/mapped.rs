@@ -59,6 +59,8 @@ fn it_says_what_is_wrong_and_leaves_no_file() {
         (&["precious", "house.ply"], "precious: exists already: name a file that may be made"),
         (&["no/such/folder/g", "house.ply"], "no/such/folder/g: cannot be made: No such file"),
         (&["g", "house.ply", "again.ply"], "and then again.ply?"),
+        (&["g", "house.ply", "-o", "house.ply"], "house.ply is read and would be overwritten"),
+        (&["mapped.ppm"], "mapped.ppm is read and would be overwritten: name another file"),
         (&["g", "none.ply"], "none.ply: cannot be opened"),
         (&["g", "house.ply", "-o", "no/picture.ppm"], "no/picture.ppm: cannot be written"),
         (&["g", "--size", "0"], "--size is a number from 1 to 16384, not `0`"),

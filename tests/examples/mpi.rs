@@ -73,8 +73,9 @@ fn errors_end_all_ranks() {
         (&["--fast"][..], "mpi: unknown option --fast: mpi --help names all of them\n"),
         (&["a.ply", "b.ply"], "mpi: one scene at a time: a.ply or b.ply?\n"),
         (&["--size", "many"], "mpi: --size is a number from 1 to 16384, not `many`\n"),
-        (&["no/such.ply"], "mpi: no/such.ply: cannot be opened\n"),
-        (&["-o", "no/such/folder/a.ppm"], "mpi: no/such/folder/a.ppm: cannot be written\n"),
+        (&["a.ply", "-o", "a.ply"], "mpi: a.ply is read and would be overwritten: name another"),
+        (&["no/such.ply"], "mpi: no/such.ply: cannot be opened: No such file"),
+        (&["-o", "no/such/folder/a.ppm"], "mpi: no/such/folder/a.ppm: cannot be written: No such"),
     ] {
         let output = output(ranks(2, program).args(words));
         let said = String::from_utf8_lossy(&output.stderr);
