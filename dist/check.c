@@ -16,7 +16,7 @@ static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
 static const uint32_t sides[12][3] = {{0, 2, 4}, {2, 6, 4}, {1, 5, 3}, {3, 5, 7}, {0, 4, 1}, {1, 4, 5},
                                       {2, 3, 6}, {3, 7, 6}, {0, 1, 2}, {1, 3, 2}, {4, 6, 5}, {5, 6, 7}};
 
-/* Room for the grids of all methods: each one's size is computed first. */
+/* One megabyte is enough for the grid of the cube by any method. */
 HGRID_ALIGNED static unsigned char memory[1 << 20], scratch[1 << 20];
 
 /* Prints a complaint, and returns 1 to count it. */
