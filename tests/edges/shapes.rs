@@ -1,6 +1,6 @@
 //! Meshes of odd shapes answer as brute force does and stay within their memory bounds.
 
-use hgrid_core::{Config, Grid, Parameters, Ray, Sizes};
+use hgrid_core::{Block, Config, Grid, Parameters, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
@@ -182,7 +182,7 @@ fn dense_rows_and_a_crowded_corner() {
 }
 
 /// A grid that would need more references than allowed is built with a lower density and reports it: building
-/// with the reported configuration gives the same grid.
+/// with the reported configuration gives the same grid, and so does the scratch that the grid reports.
 #[test]
 fn a_mesh_of_spanning_triangles_lowers_the_density() {
     let mesh = soup(300, 2.0, 23);
@@ -206,6 +206,12 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
         }
         let rebuilt = Owned::build(&view, &grid.config()).unwrap();
         assert_eq!(rebuilt.bytes(), owned.bytes(), "{config:?}");
+        let reported = usize::try_from(grid.scratch_bytes()).unwrap();
+        let [mut index, mut scratch] =
+            [owned.bytes().len(), reported].map(|bytes| vec![Block::ZERO; Block::count_for(bytes)]);
+        let scratch = &mut Block::bytes_mut(&mut scratch)[..reported];
+        let again = Grid::build(view, &config, Block::bytes_mut(&mut index), scratch).unwrap();
+        assert_eq!(again.blob(), owned.bytes(), "{config:?}");
         let mut random = Random(71);
         let mut hits = 0;
         for _ in 0..100 {

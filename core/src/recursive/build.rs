@@ -101,12 +101,12 @@ pub(crate) fn sizes(
     flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), density, depth);
+    let root = Root::of(mesh, density, depth, flags, &Watch::none())?;
+    let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), root.density, depth);
     if (scratch.len() as u64) < scratch_bytes {
-        Root::of(mesh, density, depth, flags, &Watch::none())?;
         return Sizes::new(index_bytes, scratch_bytes, false);
     }
-    let header = run(mesh, density, depth, flags, &mut [], scratch, &Watch::none())?;
+    let header = run(mesh, &root, &mut [], scratch, &Watch::none())?;
     Sizes::new(header.blob_bytes, scratch_bytes, true)
 }
 
@@ -120,11 +120,12 @@ pub(crate) fn build<'a>(
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let header = run(mesh, density, depth, flags, index, scratch, watch)?;
+    let root = Root::of(mesh, density, depth, flags, watch)?;
+    let header = run(mesh, &root, index, scratch, watch)?;
     finish(index, header)
 }
 
-/// The outermost grid, as fine as its references allow.
+/// The outermost grid, as fine as its references allow, and the density that allows it.
 struct Root {
     survey: Survey,
     /// The grid's own cells, which are the unit of all boxes below it.
@@ -175,16 +176,15 @@ fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
 /// Builds as much as the index holds; the header says what all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
-    density: f32,
-    depth: u32,
-    flags: BuildFlags,
+    root: &Root,
     index: &mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
+    let Root { survey, lattice, density, rule } = root;
+    let (density, depth) = (*density, rule.depth);
     let available_bytes = scratch.len() as u64;
     let needed_bytes = most_scratch(mesh.triangle_count(), density, depth);
-    let Root { survey, lattice, density, rule } = Root::of(mesh, density, depth, flags, watch)?;
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     if available_bytes < needed_bytes {
         return Err(too_small);
@@ -195,7 +195,7 @@ fn run(
     let (header, pool) = index.split_at_mut_checked(HEADER_BYTES).unwrap_or_default();
     // Clear the header first: if the build ends with an error, the region must not open as a grid.
     header.fill(0);
-    let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool), watch };
+    let mut builder = Builder { mesh, lattice, rule: *rule, pool: Bump::over(pool), watch };
 
     let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);
     let (ids, scratch) = scratch.split_at_mut_checked(finite).ok_or(too_small)?;
@@ -209,7 +209,7 @@ fn run(
     builder.grid(ids, &root, 0, &mut looks, scratch)?;
     let words = builder.pool.offset()?;
 
-    let mut header = Header::new(Parameters::Recursive { density, depth }, mesh, &lattice);
+    let mut header = Header::new(Parameters::Recursive { density, depth }, mesh, lattice);
     header.blob_bytes = HEADER_BYTES as u64 + section_bytes::<u32>(words.into());
     header.skipped_count = survey.skipped_count;
     header.reference_count = words;

@@ -31,7 +31,8 @@ pub struct Picture {
         allow_hyphen_values = true
     )]
     pub target: Option<Point>,
-    /// Degrees that the picture covers, from edge to edge, 1 to 120 [default: 40; 70 if `render` chooses a place in a room]
+    /// Degrees that the picture covers, from edge to edge, 1 to 120 [default: 40; 70 if `render` chooses a place in a
+    /// room]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub fov: Option<Lens>,
     /// Which axis of the scene is up [default: y, or z for STL and what lies flat on x and y]
