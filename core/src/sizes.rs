@@ -116,8 +116,8 @@ pub fn sizes_with(
 ///
 /// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls of [`sizes`], and at
 /// most 22. They use `scratch`: bring as much as [`sizes`] without scratch says. With less the grid may be coarser
-/// than the index requires: one-level and fixed grids must then fit by their bound, variable and recursive grids must
-/// be small enough to plan in the scratch.
+/// than the index requires: one-level and fixed grids must then fit by their bound, variable and recursive grids and
+/// trees must be small enough to plan in the scratch.
 ///
 /// The search relies on coarser grids being smaller. But a coarser grid may take more memory than one a few steps
 /// finer. Then the answer may be several steps too low, and a budget that only the finer grid fits into may be refused.

@@ -1,8 +1,8 @@
 //! Wrong meshes and configurations get an error that names the fault; meshes that are only odd get a grid.
 
 use hgrid_core::{
-    BatchField, BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField,
-    Method, Parameters, Ray, Sizes, Strided, TriangleMesh, sizes,
+    BatchField, Block, BuildFlags, Config, ConfigField, Error, IndexType, Instance, MAX_COORDINATE,
+    MeshField, Method, Object, Parameters, Ray, Scene, Sizes, Strided, TriangleMesh, fit, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};
@@ -114,6 +114,11 @@ fn unknown_flags_are_refused() {
     let config = Config { flags, ..Config::default() };
     let error = Error::InvalidConfig(ConfigField::Flags);
     assert_eq!(Owned::build(&ball(1, 0.0).view(), &config).unwrap_err(), error);
+    let (instances, objects) = ([Instance::new(0)], [Object::Nothing]);
+    let [mut index, mut scratch] = [(); 2].map(|()| vec![Block::ZERO; 99]);
+    let [index, scratch] = [&mut index, &mut scratch].map(|all| Block::bytes_mut(all));
+    let scene = Scene::build(&instances, &objects, &config, index, scratch);
+    assert_eq!(scene.unwrap_err(), error);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use hgrid_core::{
     BlobInfo, Block, Boxes, BuildFlags, Coherence, Config, ConfigField, Content, Error, Grid,
     Instance, Member, Method, Object, Ray, RayF64, Region, Scene, SceneHit, SceneOptions, ShapeHit,
-    Shapes, Strided, StridedMut,
+    Shapes, Strided, StridedMut, Verdict,
 };
 use hgrid_tests::meshes::{Mesh, one_triangle};
 use hgrid_tests::owned::Owned;
@@ -288,6 +288,53 @@ fn boxes_that_are_none_leave_their_shapes_out() {
     assert!(Boxes::strided(short).is_err());
     let narrow = Strided { bytes: &[0; 48], stride: 23, count: 2 };
     assert!(Boxes::strided(narrow).is_err());
+}
+
+/// A shape that answers with an infinite distance is not hit, at any scale.
+#[test]
+fn infinite_distances_are_no_hits() {
+    let boxes = [[-1.0_f32, -1.0, -1.0, 1.0, 1.0, 1.0]];
+    let boxes = Boxes::new(&boxes).unwrap();
+    let config = Config::default();
+    let built = Built::shapes(boxes, &config).unwrap();
+    let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+    for t in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN] {
+        let mut test = |_: u32, _: &Ray| Some(ShapeHit { t, u: 0.0, v: 0.0 });
+        let ray = Ray { t_min: f32::NEG_INFINITY, ..Ray::new([0.0, 0.0, 9.0], [0.0, 0.0, -1.0]) };
+        assert_eq!(shapes.intersect(&ray, &mut test), None, "{t}");
+        assert!(!shapes.occluded(&ray, &mut test), "{t}");
+        let member = |_: u32, _: &Ray| Some(ShapeHit { t, u: 0.0, v: 0.0 });
+        let objects = [Object::Shapes(&shapes, &member)];
+        for scale in [0.25, 1.0, 4.0] {
+            let scene = Built::scene(&[scaled([scale; 3])], &objects, &config).unwrap();
+            let scene = scene.open(&objects).unwrap();
+            assert_eq!(scene.intersect(&RayF64::from(&ray)), None, "{t} at scale {scale}");
+        }
+    }
+}
+
+/// A filter of a scene is not shown what lies behind a hit that it accepted, not even one step of f32.
+#[test]
+fn filters_are_shown_nothing_behind_a_hit() {
+    with_triangle(|objects| {
+        // The triangle lies in the plane z = 0.
+        let at = |z: f64| Instance { translation: [0.0, 0.0, z], ..Instance::new(0) };
+        for (first, second) in [(0.0, 2.0_f64.powi(-23)), (2.0_f64.powi(-23), 0.0)] {
+            let instances = [at(-first), at(-second)];
+            let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+            let scene = built.open(objects).unwrap();
+            let mut shown = Vec::new();
+            let mut filter = |_: usize, hit: &SceneHit| {
+                shown.push(hit.t);
+                Verdict::Accept
+            };
+            let mut options = SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
+            let ray = RayF64::new([0.2, 0.2, 1.0], [0.0, 0.0, -1.0]);
+            let hit = scene.intersect_with(&ray, &mut options).unwrap();
+            assert_eq!(hit.t.to_bits(), 1.0_f32.to_bits());
+            assert!(shown.is_sorted_by(|before, after| before > after), "{shown:?}");
+        }
+    });
 }
 
 #[test]

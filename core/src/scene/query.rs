@@ -122,7 +122,8 @@ impl fmt::Debug for SceneOptions<'_> {
 }
 
 impl Scene<'_> {
-    /// The closest hit of a ray. Where several are equally close, that of the first instance, then of the lowest id.
+    /// The closest hit of a ray. Where several are equally close, that of the first instance; within an instance its
+    /// object decides.
     ///
     /// ```
     #[doc = include_str!("../../doc/scene.txt")]
@@ -341,7 +342,12 @@ impl InstanceSearch<'_, '_> {
         let mut options = parameters.options();
         options.counters = self.counters.as_deref_mut();
         if let (Object::Grid(_), Some(filter)) = (object, &mut self.filter) {
-            show = |_: usize, hit: &Hit| filter(&to_scene(hit));
+            let limit = self.limit;
+            show = move |_: usize, hit: &Hit| {
+                let hit = to_scene(hit);
+                // The range in the object ends a step farther. `offer` drops this hit.
+                if hit.t > limit { Verdict::Accept } else { filter(&hit) }
+            };
             options.filter = Some(&mut show);
         }
         let hit = ask_object(object, &inside, until, is_any, &mut options)?;

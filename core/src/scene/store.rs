@@ -148,6 +148,7 @@ impl<'a> Scene<'a> {
         control: &Control<'_>,
     ) -> Result<Self, Error> {
         config.check_tree()?;
+        config.check()?;
         check_alignment(index, Region::Index)?;
         levels_over(objects)?;
         let count = u32::try_from(instances.len()).map_err(|_| Error::TooManyTriangles)?;

@@ -104,7 +104,7 @@ pub struct ShapeHit {
 /// Tests a shape. The test receives the number of a shape and the ray; `t_max` is that of the closest hit so far. It
 /// returns the hit, if any.
 ///
-/// An answer outside the range, or NaN, is no hit. The test may be asked about a shape that the ray does not meet; it
+/// An answer outside the range, infinite or NaN is no hit. The test may be asked about a shape that the ray does not meet; it
 /// is asked about each shape at most once for a ray, roughly front to back. It may query this tree
 /// and others. In a batch, calls for different rays alternate.
 ///
@@ -155,7 +155,8 @@ impl fmt::Debug for Shapes<'_> {
 }
 
 impl<'a> Shapes<'a> {
-    /// The memory that a build over these boxes takes: [`sizes`](crate::sizes) for shapes.
+    /// The memory that a build over these boxes takes on one thread: [`sizes`](crate::sizes) for shapes. Builds with
+    /// tasks take more scratch, which [`Sizes::bound_parallel`] counts.
     ///
     /// # Errors
     /// The errors of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
@@ -179,7 +180,8 @@ impl<'a> Shapes<'a> {
         Self::build_with(boxes, config, index, scratch, &Control::SERIAL)
     }
 
-    /// Builds a tree on the caller's threads: [`Grid::build_with`] for shapes.
+    /// Builds a tree on the caller's threads: [`Grid::build_with`] for shapes. With the scratch of one task, from
+    /// [`sizes`](Self::sizes), the build runs on one thread; [`Sizes::bound_parallel`] is enough for all tasks.
     ///
     /// # Errors
     /// The errors of [`Grid::build_with`].
@@ -361,5 +363,6 @@ impl ShapeSearch<'_, '_> {
 /// Tests a shape; returns a hit that lies in the range of the ray.
 fn hit_of(id: u32, ray: &Ray, test: &mut ShapeTest<'_>) -> Option<Hit> {
     let ShapeHit { t, u, v } = test(id, ray)?;
-    (ray.t_min <= t && t <= ray.t_max).then_some(Hit { t, u, v, primitive: id })
+    let is_in_range = ray.t_min <= t && t <= ray.t_max && t.is_finite();
+    is_in_range.then_some(Hit { t, u, v, primitive: id })
 }
