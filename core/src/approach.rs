@@ -128,8 +128,9 @@ impl Approach {
         let away = |axis: usize| (origin[axis] - f64::from(center[axis])).abs();
         let distance = greater(away(0), greater(away(1), away(2)));
         let extent = bounds.size().max_element();
-        // The ray passes no more than five extents on each axis, and its direction was rounded by half an ulp.
-        let bent = 4.0 * extent * f32::EPSILON;
+        // The ray passes no more than five extents on each axis. Its direction was rounded by half an ulp on two: on
+        // this axis and on the one of the shear.
+        let bent = 5.0 * extent * f32::EPSILON;
         if distance > f64::from(FAR_EXTENTS * extent) {
             let approach = Self::from_afar(ray, line, bounds, inverse)?;
             return Some(Self { slack: (approach.slack + bent).next_up(), ..approach });

@@ -134,7 +134,8 @@ impl Line {
         })
     }
 
-    /// The distance behind which every `t` is larger than this one, its rounding included.
+    /// The distance at which a walk may end after a hit at `t`: all that lies farther away has a larger `t`, rounding
+    /// included.
     #[inline(always)]
     pub(crate) fn distance(&self, t: f32) -> f32 {
         round((f64::from(t.next_up()) - self.start) * self.scale)

@@ -37,8 +37,8 @@
 //! W          those of U, V and det, and two of its own          2 + 2    28 u D R E + 18 u D E^2
 //! ```
 //!
-//! The own roundings of W act on values that are at most |det| <= 2 D E^2 if the line meets the
-//! triangle, which is the only case that matters.
+//! W has two roundings of its own. They act on values of at most |det| <= 2 D E^2 if the line meets the triangle. No
+//! other case matters.
 //!
 //! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the sheared plane: by
 //! the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 of the corner's distance, and by the distance

@@ -443,7 +443,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The least and the greatest corner of the grid's box, in scene units: the mesh's box and a
-    /// pad of about 1e-5 of its extent.
+    /// pad of about 1e-5 of its extent, and more where f32 has no such small steps.
     #[must_use]
     pub const fn bounds(&self) -> ([f32; 3], [f32; 3]) {
         (self.lattice.min, self.lattice.max)

@@ -160,7 +160,7 @@ impl OwnedMesh {
 
     /// The mesh that builds and queries read. O(1).
     ///
-    /// It is empty if the containers do not hold what they held at first.
+    /// It is empty if the lengths of the containers have changed and do not fit together any more.
     #[must_use]
     pub fn view(&self) -> TriangleMesh<'_> {
         self.try_view().unwrap_or(TriangleMesh::EMPTY)
@@ -295,7 +295,7 @@ impl OwnedGrid {
 
     /// The view that queries run on. O(1), but more than a short query: take it once for many rays.
     ///
-    /// It hits nothing if the containers of the mesh do not hold what they held at first.
+    /// It hits nothing if a container of the mesh has another length than at first. It does not notice other content.
     #[must_use]
     pub fn grid(&self) -> Grid<'_> {
         let grid = self.mesh.try_view().and_then(|mesh| Grid::open(self.index.bytes(), mesh));

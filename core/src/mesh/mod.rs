@@ -76,7 +76,7 @@ pub struct TriangleMesh<'a> {
     /// For boxes and parts only their number.
     indices: Strided<'a>,
     layout: IndexLayout<'a>,
-    /// No elements: every triangle has all bits. For parts only their number, if any has masks.
+    /// Empty if no triangle has a mask. A joined mesh keeps only their number, and only if a part has masks.
     masks: Strided<'a>,
 }
 

@@ -361,8 +361,8 @@ impl CellSpread<'_> {
 
         let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
         let row_offsets = bench.row_offsets.get_mut(..height * depth).or_bug("too many rows")?;
-        // Take a few words more, if there are: the last ones are not read eight at a time. Take no more: first fit
-        // would clear them.
+        // Lend up to eight words more: first fit reads eight at a time, and the last ones one by one. Lend no more than
+        // that: first fit clears what it gets.
         let enough = cells.div_ceil(WORD_BITS) + 1;
         let words = bench.occupied.len().min(enough + 8).max(enough);
         let occupied = bench.occupied.get_mut(..words).or_bug("more slots than on the bench")?;
