@@ -12,7 +12,7 @@ use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, scattered};
 
 use super::batches::{COHERENCES, odd_rays};
-use super::scenes::{enter, ray, with_grids};
+use super::scenes::{enter, ray, spread_masks, with_grids};
 
 /// Returns rays of every kind: tiles of cameras near and far, rays from one place, rays from anywhere, and odd ones.
 fn rays(scene: &Scene<'_>, width: f64) -> Vec<RayF64> {
@@ -53,6 +53,11 @@ fn compare(scene: &Scene<'_>, rays: &[RayF64]) -> usize {
         };
         let alone: Vec<_> = rays.iter().map(alone).collect();
         hits += alone.iter().flatten().count();
+        // With all bits, a query sees an instance whose mask has none.
+        for hit in alone.iter().flatten() {
+            let shown = scene.instance(hit.path[0]).unwrap().mask;
+            assert!(mask == u32::MAX || shown & mask != 0, "{hit:?}");
+        }
         let expected: Vec<_> =
             alone.iter().map(|hit| bits(&hit.unwrap_or(SceneHit::MISS))).collect();
         let blocked: Vec<u8> = alone.iter().map(|hit| hit.is_some().into()).collect();
@@ -87,7 +92,7 @@ fn batches_in_scenes_of_grids_answer_as_each_ray_alone() {
     with_grids(|objects, _| {
         for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
             let mut instances = scattered(count, 3, width, 8);
-            instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+            spread_masks(&mut instances);
             // Let pairs of instances share a place: the first of each pair is reported.
             for second in count / 2..count {
                 let Instance { id, mask, .. } = instances[second];
@@ -95,8 +100,12 @@ fn batches_in_scenes_of_grids_answer_as_each_ray_alone() {
             }
             let built = Built::scene(&instances, objects, &Config::default()).unwrap();
             let scene = built.open(objects).unwrap();
-            let hits = compare(&scene, &rays(&scene, width));
+            let rays = rays(&scene, width);
+            let hits = compare(&scene, &rays);
             assert!(count == 0 || width > 10.0 || hits > 100, "{hits} hits");
+            let hits = rays.iter().filter_map(|ray| scene.intersect(ray));
+            let without_bits = hits.filter(|hit| instances[hit.path[0] as usize].mask == 0);
+            assert!(count < 60 || width > 10.0 || without_bits.count() > 10);
         }
     });
 }
@@ -205,7 +214,7 @@ fn batches_in_scenes_of_shapes_and_scenes_answer_as_each_ray_alone() {
         let all =
             [objects[0], Object::Shapes(&shapes, &test), Object::Scene(&inner_scene), objects[2]];
         let mut instances = scattered(40, 4, 12.0, 33);
-        instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+        spread_masks(&mut instances);
         let built = Built::scene(&instances, &all, &Config::default()).unwrap();
         let scene = built.open(&all).unwrap();
         let hits = compare(&scene, &rays(&scene, 12.0));

@@ -74,23 +74,32 @@ impl Alone {
     }
 }
 
+/// Gives instances one of three masks, and every fifth a mask without bits.
+pub(crate) fn spread_masks(instances: &mut [Instance]) {
+    for instance in instances {
+        instance.mask = if instance.id % 5 == 4 { 0 } else { 1 << (instance.id % 3) };
+    }
+}
+
 #[test]
 fn a_scene_answers_as_each_of_its_instances_alone() {
     with_grids(|objects, _| {
         for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
             let mut instances = scattered(count, 3, width, 8);
-            instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+            spread_masks(&mut instances);
             // Put two instances in the same place: the first of them is reported.
             if let [first, .., last] = &mut instances[..] {
                 *last = Instance { id: last.id, ..*first };
             }
-            let alone = Alone::new(&instances, objects);
+            // Alone, each has all bits, so that only this test looks at masks.
+            let seen = |instance: &Instance| Instance { mask: u32::MAX, ..*instance };
+            let alone = Alone::new(&instances.iter().map(seen).collect::<Vec<_>>(), objects);
             for quality in [Quality::Fast, Quality::High] {
                 let config = Config::from(Parameters::Bvh { quality });
                 let built = Built::scene(&instances, objects, &config).unwrap();
                 let scene = built.open(objects).unwrap();
                 let mut random = Random(5);
-                let mut hits = 0;
+                let (mut hits, mut without_bits) = (0, 0);
                 for round in 0..300 {
                     let ray = ray(&mut random, round, width as f32);
                     let expected =
@@ -99,8 +108,10 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
                     assert_eq!(hit, expected, "{ray:?}");
                     assert_eq!(scene.occluded(&ray), expected.is_some(), "{ray:?}");
                     hits += usize::from(hit.is_some());
+                    let mask_hit = hit.map(|hit| instances[hit.path[0] as usize].mask);
+                    without_bits += usize::from(mask_hit == Some(0));
 
-                    let mask = [1, 2, 6][round % 3];
+                    let mask = [1, 2, 6, u32::MAX - 1][round % 4];
                     let with_mask = |scene: &Scene<'_>, ray: &RayF64| {
                         let mut work = Counters::default();
                         let counters = Some(&mut work);
@@ -108,13 +119,16 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
                             SceneOptions { mask, counters, ..SceneOptions::default() };
                         scene.intersect_with(ray, &mut options)
                     };
-                    let expected =
-                        alone.closest(objects, &ray, |_, scene, ray| with_mask(scene, ray));
+                    let expected = alone.closest(objects, &ray, |number, scene, ray| {
+                        let is_seen = instances[number as usize].mask & mask != 0;
+                        if is_seen { scene.intersect(ray) } else { None }
+                    });
                     assert_eq!(with_mask(&scene, &ray), expected);
                     let mut options = SceneOptions { mask, ..SceneOptions::default() };
                     assert_eq!(scene.occluded_with(&ray, &mut options), expected.is_some());
                 }
                 assert!(count < 7 || width > 10.0 || hits > 20, "{hits} hits");
+                assert!(count < 60 || width > 10.0 || without_bits > 2, "{without_bits}");
             }
         }
     });
