@@ -193,6 +193,43 @@ fn all_hits_of_grids_take_a_walk_for_each_sixteen() {
 }
 
 #[test]
+fn walks_of_a_filter_grow_to_sixteen_hits() {
+    let (_, mesh) = worst().into_iter().find(|(name, _)| *name == "same").unwrap();
+    let ray = Ray::new([0.2, 0.2, -4.0], [0.0, 0.0, 1.0]);
+    for method in METHODS {
+        let view = mesh.view();
+        let owned = Owned::build(&view, &Config::new(method)).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let (mut room, mut one_walk) = (vec![Hit::MISS; N as usize + 1], Counters::default());
+        let options = &mut QueryOptions::counting(&mut one_walk);
+        assert_eq!(grid.intersect_all(&ray, options, &mut room), N as usize);
+
+        let closest = |options: &mut QueryOptions<'_>| grid.intersect_with(&ray, options).is_some();
+        let any = |options: &mut QueryOptions<'_>| grid.occluded_with(&ray, options);
+        let all = |options: &mut QueryOptions<'_>| {
+            grid.intersect_all(&ray, options, &mut [Hit::MISS; 3]) > 0
+        };
+        // Walks for 1, 2, 4 and 8 hits, one for each sixteen after them, and one that finds the rest.
+        let full = u64::from(N) / 16 + 1;
+        type Ask<'a> = &'a dyn Fn(&mut QueryOptions<'_>) -> bool;
+        let queries: [(Ask<'_>, u64); 3] = [(&closest, 5 + full), (&any, 5 + full), (&all, full)];
+        for (ask, walks) in queries {
+            let (mut work, mut shown) = (Counters::default(), 0);
+            let mut reject = |_: usize, _: &Hit| {
+                shown += 1;
+                Verdict::Reject
+            };
+            let options = QueryOptions::counting(&mut work);
+            let is_hit = ask(&mut QueryOptions { filter: Some(&mut reject), ..options });
+            assert_eq!((is_hit, shown), (false, N));
+            let most = walks * one_walk.primitive_tests;
+            assert!(work.primitive_tests <= most, "{method:?}: {work:?} above {most}");
+            hold("same", &grid, &work, walks);
+        }
+    }
+}
+
+#[test]
 fn no_point_does_more_than_its_bound() {
     let mut random = Random(13);
     for (name, mesh) in worst() {
