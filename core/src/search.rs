@@ -262,3 +262,62 @@ fn for_finite(mesh: &TriangleMesh<'_>, ask: &mut dyn FnMut(u32) -> Outcome) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::arena::Block;
+    use crate::config::Config;
+    use crate::counters::Counters;
+    use crate::grid::Grid;
+    use crate::method::Method;
+    use crate::options::{Cull, QueryOptions};
+    use crate::random::point;
+    use crate::ray::Ray;
+
+    /// A plain query counts nothing, so no other test would see that its rays do not end at their hits.
+    #[test]
+    fn plain_rays_end_at_their_hits() {
+        let mut state = 1;
+        let count = if cfg!(miri) { 60 } else { 3000 };
+        let positions: Vec<_> = (0..count)
+            .flat_map(|_| {
+                let middle = point(&mut state);
+                [(); 3].map(|()| (middle + 0.1 * point(&mut state)).to_array())
+            })
+            .collect();
+        let indices: Vec<_> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        for &method in Method::ALL {
+            let mut memory = [(); 2].map(|()| vec![Block::ZERO; 100_000]);
+            let [index, scratch] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+            let grid = Grid::build(mesh, &Config::new(method), index, scratch).unwrap();
+            let mut sums = [0; 2];
+            for _ in 0..if cfg!(miri) { 3 } else { 300 } {
+                let ray = &Ray::new(point(&mut state).to_array(), point(&mut state).to_array());
+                let [closest, any] = [false, true].map(|is_any| {
+                    let mut one = One { hit: Hit { t: ray.t_max, ..Hit::MISS }, is_any };
+                    let (mut work, part) = (Counters::default(), [ray.t_min, ray.t_max]);
+                    grid.search(ray, part, Cull::None, &mut one, &mut work);
+                    (one.hit.primitive != INVALID_ID, work)
+                });
+                let mut counted = Counters::default();
+                let mut options = QueryOptions::counting(&mut counted);
+                let is_hit = grid.intersect_with(ray, &mut options).is_some();
+                assert_eq!((closest.0, any.0), (is_hit, is_hit), "{method:?} {ray:?}");
+                let of = |work: &Counters| [work.primitive_tests, work.cell_steps, work.grid_steps];
+                for [any, closest, counted] in
+                    [0, 1, 2].map(|i| [&any.1, &closest.1, &counted].map(|work| of(work)[i]))
+                {
+                    assert!(any <= closest && closest <= counted, "{method:?} {ray:?}");
+                }
+                sums[0] += any.1.primitive_tests;
+                sums[1] += closest.1.primitive_tests;
+            }
+            assert!(cfg!(miri) || sums[0] < sums[1], "{method:?}: {sums:?}");
+        }
+    }
+}

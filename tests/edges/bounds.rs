@@ -1,4 +1,7 @@
 //! Queries and builds stay within the bounds of docs/bounds.md, counted and not timed, on the worst known meshes.
+//!
+//! The counters are those of queries with options. A plain query of one ray counts nothing: a unit test in
+//! core/src/search.rs counts that its search does no more work.
 
 use hgrid_core::{
     Block, Config, Counters, Grid, Hit, Method, Parameters, QueryOptions, Ray, Sizes, Verdict,

@@ -5,6 +5,9 @@
 //! `content` is a hash of the contents of the lists, `words` a hash of all words after the header, on
 //! little-endian machines. If only `words` differs, `BLOB_VERSION` must change. `HGRID_BLESS=1` writes the table
 //! anew.
+//!
+//! The counters are those of queries with options. A plain query of one ray counts nothing: a unit test in
+//! core/src/search.rs counts that its search does no more work.
 
 use std::fmt::Write as _;
 use std::path::Path;
