@@ -1,10 +1,12 @@
 //! Shapes of the caller: every query agrees with a loop over all of them.
 
 use std::collections::HashSet;
+use std::sync::Mutex;
 
 use hgrid_core::{
-    BatchField, Boxes, Coherence, Config, Counters, Error, Hit, Parameters, Quality, QueryOptions,
-    Ray, ShapeHit, Shapes, Strided, StridedMut,
+    BatchField, Boxes, Coherence, Config, Counters, Error, Hit, Instance, Object, Parameters,
+    Quality, QueryOptions, Ray, RayF64, SceneHit, SceneOptions, ShapeHit, Shapes, Strided,
+    StridedMut,
 };
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::Built;
@@ -281,7 +283,7 @@ fn batches_answer_as_each_ray_alone() {
 }
 
 #[test]
-fn shapes_of_a_batch_are_tested_once_for_each_ray() {
+fn shapes_are_tested_once_for_each_ray() {
     let all = spheres(400, 0.1, 3);
     let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
     let boxes = Boxes::new(&boxes).unwrap();
@@ -292,19 +294,63 @@ fn shapes_of_a_batch_are_tested_once_for_each_ray() {
             Ray::new([0.0, 0.0, 4.0], [0.05 * f32::from(at % 8), 0.005 * f32::from(at / 8), -4.0])
         })
         .collect();
-    let mut asked = HashSet::new();
-    let mut test = |id: u32, part: &Ray| {
+    let asked = Mutex::new(HashSet::new());
+    let test = |id: u32, part: &Ray| {
         assert!(
-            asked.insert((id, part.direction.map(f32::to_bits))),
+            asked.lock().unwrap().insert((id, part.direction.map(f32::to_bits))),
             "shape {id} was tested twice for one ray"
         );
         meet(all[id as usize], part)
     };
-    let mut hits = vec![Hit::MISS; rays.len()];
-    let (given, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
-    let options = &mut QueryOptions::default();
-    shapes.intersect_n(&given, answers, Coherence::Coherent, options, &mut test).unwrap();
-    assert!(asked.len() > 500, "{}", asked.len());
+    let objects = [Object::Shapes(&shapes, &test)];
+    let scene = Built::scene(&[Instance::new(0)], &objects, &Config::default()).unwrap();
+    let scene = scene.open(&objects).unwrap();
+    let wide: Vec<_> = rays.iter().map(RayF64::from).collect();
+    let (given, wide_given) = (Strided::new(&rays), Strided::new(&wide));
+    // Any hit ends a ray, so fewer shapes are tested.
+    let finish = |least: usize, name: &str| {
+        let tests = asked.lock().unwrap().drain().count();
+        assert!(tests > least, "{name}: {tests}");
+    };
+    for ray in &rays {
+        let _ = shapes.intersect_with(ray, &mut QueryOptions::default(), &mut { test });
+    }
+    finish(500, "intersect_with");
+    for ray in &rays {
+        let _ = shapes.occluded_with(ray, &mut QueryOptions::default(), &mut { test });
+    }
+    finish(300, "occluded_with");
+    for ray in &wide {
+        let _ = scene.intersect(ray);
+    }
+    finish(500, "intersect in a scene");
+    for ray in &wide {
+        let _ = scene.occluded(ray);
+    }
+    finish(300, "occluded in a scene");
+    let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![0_u8; rays.len()]);
+    let mut found = vec![SceneHit::MISS; rays.len()];
+    let mut memory = vec![0; 16 * rays.len()];
+    for coherence in COHERENCES {
+        for lent in [0, 16 * rays.len()] {
+            let scratch = &mut memory[..lent];
+            let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
+            let answers = &mut StridedMut::new(&mut hits);
+            shapes.intersect_n(&given, answers, coherence, options, &mut { test }).unwrap();
+            finish(500, "intersect_n");
+            let answers = &mut StridedMut::new(&mut occluded);
+            shapes.occluded_n(&given, answers, coherence, options, &mut { test }).unwrap();
+            finish(300, "occluded_n");
+            let scratch = &mut memory[..lent];
+            let options = &mut SceneOptions { scratch, ..SceneOptions::default() };
+            let answers = &mut StridedMut::new(&mut found);
+            scene.intersect_n(&wide_given, answers, coherence, options).unwrap();
+            finish(500, "intersect_n in a scene");
+            let answers = &mut StridedMut::new(&mut occluded);
+            scene.occluded_n(&wide_given, answers, coherence, options).unwrap();
+            finish(300, "occluded_n in a scene");
+        }
+    }
 }
 
 #[test]
