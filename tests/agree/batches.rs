@@ -561,6 +561,22 @@ fn filters_and_counters_are_those_of_single_rays() {
             assert!(hits == expected && shown == expected_shown, "{:?}", config.method());
             assert_eq!(work, expected_work);
 
+            // With counters, each ray is traced alone. Without them, a tree takes the rays in groups.
+            shown.clear();
+            let mut filter = |place: usize, hit: &Hit| {
+                shown.push((place, *hit));
+                verdict(hit)
+            };
+            let mut options = QueryOptions {
+                filter: Some(&mut filter),
+                scratch: &mut scratch,
+                ..QueryOptions::default()
+            };
+            hits.fill(Hit::MISS);
+            let answers = &mut StridedMut::new(&mut hits);
+            grid.intersect_n_with(&Strided::new(rays), answers, coherence, &mut options).unwrap();
+            assert!(hits == expected && shown == expected_shown, "{:?}", config.method());
+
             // Without a filter.
             let (mut work, mut expected_work) = (Counters::default(), Counters::default());
             let expected = rays.iter().map(|ray| {
