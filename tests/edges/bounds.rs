@@ -265,14 +265,23 @@ fn builds_stay_within_their_references() {
             let view = mesh.view();
             let owned = Owned::build(&view, &Config::new(method)).unwrap();
             let grid = owned.open(&view).unwrap();
-            let most = match method {
-                Method::OneLevel | Method::Fixed => 16 * n + 64,
-                Method::Bvh => n,
+            let top = 16 * n + 64;
+            let (counted, most) = match grid.config().parameters {
+                // The references count, and not the words of subgrids. Each subgrid of k triangles has at most
+                // 16 k + 64, where k is more than `subdivide_above`.
+                Parameters::Variable { subdivide_above, .. } => {
+                    let subgrids = top / (u64::from(subdivide_above) + 1);
+                    (grid.inspect().reference_count, 16 * top + 64 * subgrids)
+                }
                 // Two words for each cell that the build may look at, and the root.
-                Method::Recursive => 2 * (512 * n + 65_536) + (28 + 16) * n + 129,
-                _ => u64::from(u32::MAX),
+                Parameters::Recursive { .. } => {
+                    let words = 2 * (512 * n + 65_536) + (28 + 16) * n + 129;
+                    (grid.reference_count().into(), words)
+                }
+                Parameters::Bvh { .. } => (grid.reference_count().into(), n),
+                _ => (grid.reference_count().into(), top),
             };
-            assert!(u64::from(grid.reference_count()) <= most, "{name}, {method:?}");
+            assert!(counted <= most, "{name}, {method:?}: {counted} above {most}");
             println!(
                 "{name} {method:?}: {} words a triangle",
                 u64::from(grid.reference_count()) / n
