@@ -4,7 +4,7 @@ use hgrid_core::{
     Coherence, Config, Cull, Grid, Hit, INVALID_ID, Instance, Method, Object, QueryOptions, Ray,
     RayF64, Scene, SceneHit, SceneOptions, SimdLevel, Strided, StridedMut, Verdict,
 };
-use hgrid_tests::copy::Copy;
+use hgrid_tests::copy::{Copy, word};
 use hgrid_tests::meshes::{Mesh, soup};
 use hgrid_tests::oracle;
 use hgrid_tests::owned::Owned;
@@ -18,6 +18,14 @@ const HEADER: usize = 128;
 /// The size of a node, and where its first child, its low and its high sides stand in it.
 const NODE: usize = 80;
 const CHILD: usize = 16;
+/// Where a node says whether it has fine sides, in the top bit; their size, and that of the least sides and of all.
+const FIRST: usize = 20;
+const FINE: usize = 196;
+const FINE_LOW: usize = 96;
+const FINE_SIDES: usize = 192;
+/// Where the header has the number of fine sides and that of nodes.
+const FINE_COUNT: usize = 84;
+const NODE_COUNT: usize = 112;
 const LOW: usize = 32;
 const HIGH: usize = 56;
 
@@ -164,7 +172,13 @@ fn interleaved_rays_end_in_damaged_trees() {
     let sound = hits(&owned.open(&view).unwrap());
     // Nodes stand behind the ids, which are padded.
     let first = HEADER + (4 * mesh.indices.len()).next_multiple_of(64);
-    let nodes = (owned.bytes().len() - first) / NODE;
+    let [nodes, fine_count] = [NODE_COUNT, FINE_COUNT].map(|at| word(owned.bytes(), at) as usize);
+    let fine = first + (NODE * nodes).next_multiple_of(64);
+    let end = fine + (FINE * fine_count).next_multiple_of(64);
+    assert_eq!(end, owned.bytes().len());
+    let has_fine = |node: &usize| word(owned.bytes(), first + NODE * node + FIRST) >> 31 == 1;
+    assert_eq!((0..nodes).filter(has_fine).count(), fine_count);
+    assert!(fine_count > 1, "{fine_count}");
     // All children are the root, and in the second round all boxes are met, too.
     for all_are_met in [false, true] {
         let mut copy = Copy::of(owned.bytes());
@@ -173,6 +187,12 @@ fn interleaved_rays_end_in_damaged_trees() {
             if all_are_met {
                 copy.set(at + LOW, &[0; HIGH - LOW]);
                 copy.set(at + HIGH, &[255; NODE - HIGH]);
+            }
+        }
+        for at in (0..fine_count).map(|number| fine + FINE * number).filter(|_| all_are_met) {
+            for side in (at..at + FINE_SIDES).step_by(4) {
+                let bound = if side < at + FINE_LOW { -1e30_f32 } else { 1e30 };
+                copy.set_word(side, bound.to_bits());
             }
         }
         let grid = Grid::open(copy.bytes(), view).unwrap();

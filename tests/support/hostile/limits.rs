@@ -2,6 +2,11 @@
 
 use hgrid_core::{Counters, Grid, Method, Parameters};
 
+use crate::copy::word;
+
+/// The offset of the header's field for the nodes of a tree.
+const NODE_COUNT: usize = 112;
+
 /// Returns the most that a query of one ray may count.
 ///
 /// A walk moves one axis towards its end at every step, so it has no more steps than the sum of the cells
@@ -33,10 +38,9 @@ pub fn most(grid: &Grid<'_>) -> Counters {
     Counters { primitive_tests, cell_steps, grid_steps: cell_steps }
 }
 
-/// Returns the number of nodes of a tree, which follow the ids.
+/// Returns the number of nodes of a tree, as its header has it.
 fn nodes(grid: &Grid<'_>) -> u64 {
-    let ids = (4 * u64::from(grid.reference_count())).next_multiple_of(64);
-    (grid.blob_bytes() as u64 - 128 - ids) / 80
+    word(grid.blob(), NODE_COUNT).into()
 }
 
 /// Returns the steps on all levels if all macrocells were full.
