@@ -1,7 +1,7 @@
 //! Single bits of a blob are flipped. Queries end after bounded work, and `validate` refuses the blob, or the
 //! blob is one that a build makes with other parameters, and answers right.
 //!
-//! The usual tests flip every bit of the smallest blobs, and every 13th bit of others, so that each bit of a
+//! The usual tests flip every bit of the smallest blobs, and every 29th bit of others, so that each bit of a
 //! byte gets its turn; the slow tests flip every bit of all.
 
 use std::ops::Range;
