@@ -11,33 +11,33 @@ use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-type Point = [f64; 3];
+pub(super) type Point = [f64; 3];
 
 /// A part of space with the triangles in it.
-struct Leaf {
-    min: Point,
-    max: Point,
-    ids: Vec<u32>,
+pub(super) struct Leaf {
+    pub(super) min: Point,
+    pub(super) max: Point,
+    pub(super) ids: Vec<u32>,
 }
 
 /// The bytes of a blob, with functions that read numbers at offsets.
 #[derive(Clone, Copy)]
-struct Bytes<'a>(&'a [u8]);
+pub(super) struct Bytes<'a>(pub(super) &'a [u8]);
 
 impl Bytes<'_> {
-    fn u32(self, at: usize) -> u32 {
+    pub(super) fn u32(self, at: usize) -> u32 {
         u32::from_ne_bytes(self.0[at..at + 4].try_into().unwrap())
     }
 
-    fn u64(self, at: usize) -> u64 {
+    pub(super) fn u64(self, at: usize) -> u64 {
         u64::from_ne_bytes(self.0[at..at + 8].try_into().unwrap())
     }
 
-    fn f32(self, at: usize) -> f64 {
+    pub(super) fn f32(self, at: usize) -> f64 {
         f64::from(f32::from_bits(self.u32(at)))
     }
 
-    fn f32s(self, at: usize) -> Point {
+    pub(super) fn f32s(self, at: usize) -> Point {
         [0, 4, 8].map(|axis| self.f32(at + axis))
     }
 
@@ -47,26 +47,26 @@ impl Bytes<'_> {
 }
 
 /// The header's fields, named as in the page.
-struct Header {
-    blob_bytes: usize,
-    vertex_count: usize,
-    triangle_count: usize,
-    skipped_count: usize,
-    method: u32,
-    bounds_min: Point,
-    bounds_max: Point,
-    resolution: [u32; 3],
-    hash_count: usize,
-    reference_count: usize,
-    macrocell_factor: u32,
-    mesh: u32,
-    node_count: usize,
+pub(super) struct Header {
+    pub(super) blob_bytes: usize,
+    pub(super) vertex_count: usize,
+    pub(super) triangle_count: usize,
+    pub(super) skipped_count: usize,
+    pub(super) method: u32,
+    pub(super) bounds_min: Point,
+    pub(super) bounds_max: Point,
+    pub(super) resolution: [u32; 3],
+    pub(super) hash_count: usize,
+    pub(super) reference_count: usize,
+    pub(super) macrocell_factor: u32,
+    pub(super) content: u32,
+    pub(super) mesh: u32,
+    pub(super) node_count: usize,
 }
 
-fn header(blob: Bytes<'_>) -> Header {
+pub(super) fn header(blob: Bytes<'_>) -> Header {
     assert_eq!(&blob.0[..8], b"hgrid\x0d\x0a\x1a");
     assert_eq!((blob.u32(8), blob.u32(12)), (0x0102_0304, 4));
-    assert_eq!(blob.u32(104), 0);
     let mut h = 0xcbf2_9ce4_8422_2325_u64;
     for word in 0..31 {
         h = (h ^ u64::from(blob.u32(4 * word))).wrapping_mul(0x0100_0000_01b3);
@@ -85,20 +85,21 @@ fn header(blob: Bytes<'_>) -> Header {
         hash_count: blob.u32(84) as usize,
         reference_count: blob.u32(88) as usize,
         macrocell_factor: blob.u32(92),
+        content: blob.u32(104),
         mesh: blob.u32(108),
         node_count: blob.u32(112) as usize,
     }
 }
 
 /// Reads sections one after the other.
-struct Sections<'a> {
-    blob: Bytes<'a>,
-    at: usize,
+pub(super) struct Sections<'a> {
+    pub(super) blob: Bytes<'a>,
+    pub(super) at: usize,
 }
 
 impl Sections<'_> {
     /// Returns the start of the next section, which has `bytes` bytes, and asserts that its padding is zero.
-    fn next(&mut self, bytes: usize) -> usize {
+    pub(super) fn next(&mut self, bytes: usize) -> usize {
         let (at, end) = (self.at, self.at + bytes);
         self.at = end.next_multiple_of(64);
         assert!(self.blob.0[end..self.at].iter().all(|&byte| byte == 0));
@@ -106,7 +107,7 @@ impl Sections<'_> {
     }
 }
 
-fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
+pub(super) fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     assert_eq!(header.resolution, [1; 3]);
     assert_eq!(header.reference_count, header.triangle_count - header.skipped_count);
     let mut sections = Sections { blob, at: 128 };
@@ -379,6 +380,7 @@ fn check(mesh: &Mesh, grid: &Grid<'_>) {
     let mut kept = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     let blob = Bytes(grid.pack(Block::bytes_mut(&mut kept)).unwrap());
     let header = header(blob);
+    assert_eq!(header.content, 0);
     let leaves = match header.method {
         1..=3 => hashed(blob, &header),
         4 => recursive(blob, &header),

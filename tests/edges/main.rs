@@ -3,6 +3,7 @@
 mod blobs;
 mod bounds;
 mod format;
+mod format_scenes;
 mod inputs;
 mod joined;
 mod mixed;
