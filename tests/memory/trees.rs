@@ -164,7 +164,7 @@ fn the_worst_meshes_stay_within_the_bound() {
         }
     }
     let mut deepest = 0;
-    for count in [4095, 4096, 4097, 4319, 4320, 4321, 4400, 8192, 9001, 20_000] {
+    for count in [4095, 4096, 4097, 4319, 4320, 4321, 4400, 8192, 9001, 20_000, 100_000] {
         let mut meshes = vec![one_centre(count), one_by_one(count), many_nested(count)];
         meshes.extend((1..8).map(|depth| nested(count, depth)));
         for mesh in meshes {

@@ -10,10 +10,10 @@
 //! spare   | centres of a crowded unit, then second buffer of the sorts | untouched |
 //! ```
 //!
-//! Two of the three numbers of each centre of a crowded unit are stored in memory that the build writes later in any
-//! case. One number lies where the id will be. The other lies where nodes will be, as many as any tree over the
-//! triangles has; then where the ids of later units will be; then in `spare`. Once the entries have new keys, no centre
-//! is needed any more, and the same memory is the second buffer when they are sorted by bins.
+//! A centre of a crowded unit has three numbers. The first replaces the key. The other two are stored in memory that
+//! the build writes later in any case. One lies where the id will be. The other lies where nodes will be; if these are
+//! too few, where the ids of later units will be; and then in `spare`. Once the entries have new keys, no centre is
+//! needed any more, and the same memory is the second buffer when they are sorted by bins.
 //!
 //! The record of a root is 112 bytes, written over entries that were used up:
 //! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
@@ -117,10 +117,11 @@ impl Roots<'_> {
                     self.divide(range, &centers, depth);
                     return;
                 }
-                // Equal centres keep the order of their ids.
-                for entry in self.entries.get_mut(range.clone()).into_iter().flatten() {
-                    entry[0] = 0;
-                }
+            }
+            // Equal centres keep the order of their ids. So do units that are still crowded: their keys are not in
+            // order, and each cut would look for a change of bits anew.
+            for entry in self.entries.get_mut(range.clone()).into_iter().flatten() {
+                entry[0] = 0;
             }
         } else {
             let entries = self.entries.get_mut(range.clone());
@@ -137,7 +138,7 @@ impl Roots<'_> {
     /// split in two: where the highest bit changes in which the keys of its ends differ, or in the middle if they are
     /// equal. No part has fewer than [`LEAST_PIECE`] entries.
     ///
-    /// A unit that is still too large after [`DIVISIONS`] divisions is sorted by bin alone, which makes worse boxes.
+    /// A unit that is still too large after [`DIVISIONS`] divisions is halved by ids, which makes worse boxes.
     fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {
