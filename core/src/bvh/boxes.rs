@@ -85,8 +85,8 @@ pub(crate) struct Beam<S: Simd> {
 pub(crate) struct BeamMet<S: Simd> {
     /// The boxes that at least one ray may meet, as bits.
     pub(crate) some: u32,
-    /// The boxes that every ray meets before it ends, up to rounding, as bits. A ray that misses such a box only
-    /// costs time.
+    /// The boxes that the line of every ray crosses behind its start, up to rounding, as bits. Ends do not count: a ray
+    /// that ends before such a box only costs time.
     pub(crate) all: u32,
     /// For each box, a distance before which no ray enters it.
     pub(crate) enter: f32x8<S>,

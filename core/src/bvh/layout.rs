@@ -9,15 +9,15 @@
 //!
 //! - A node of a subtree has eight children, or none that are nodes. So a root over `m` triangles has no more than
 //!   (m - 1) / 7 nodes below it ([`subtree`](super::subtree)).
-//! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
-//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
+//! - Let `R` be the number of roots. Above them, `a` nodes have eight children. `b` nodes have fewer, and all their
+//!   children are roots. Then `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
 //!   1 + 4/7 = 11/7 nodes, itself included.
 //! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
 //!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
-//! - The last unit behind the crowded bins may have too few triangles for a root, and so may the last one of each
-//!   division of a crowded bin: one more root for each. A crowded bin has more than [`CROWD`] triangles, and divisions
-//!   nest at most [`DIVISIONS`] deep.
+//! - A unit may have too few triangles for a root if it is the last one behind the crowded bins, or the last one of a
+//!   division of a crowded bin. Each such unit adds one root. A crowded bin has more than [`CROWD`] triangles, and
+//!   divisions nest at most [`DIVISIONS`] deep.
 //!
 //! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles, or a
 //! single one. A unit is sorted with `spare` as the second buffer, of as many entries. More of it is needed by
@@ -29,7 +29,7 @@
 //!
 //! ```text
 //! late roots <= 5 n / 4097 + 1                      behind crowded bins, see above
-//! nodes      <= 0.14625 n + 1 + 11 late / 7 + 3     1 as the first term is rounded up; 3 with the root of all
+//! nodes      <= 0.14625 n + 1 + 11 late / 7 + 3     1 as the first term is rounded up; 3 are to spare
 //! fine       <= n / 2048                             none below 2048 triangles
 //! index       = 128 + 4 n + 80 nodes + 196 fine, and paddings of at most 60, 48 and 60
 //!            <= 15.7 n + 636                        n < 2048: one late root, for which 11 / 7 is rounded down to 1
@@ -127,7 +127,7 @@ pub(crate) const fn most_below(triangles: u32) -> u32 {
 
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u32) -> u32 {
-    // The root of all is one more.
+    // Three are to spare.
     parts_of(triangles, NODES_PER_TRIANGLE) + 11 * late_roots(triangles) / 7 + 3
 }
 

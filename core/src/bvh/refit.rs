@@ -1,7 +1,7 @@
 //! Refit: new boxes for a tree whose triangles moved, in place.
 //!
 //! ```text
-//! check   the mesh has the triangles of the tree; walking down from the root meets as many nodes as there are
+//! check   the mesh has the triangles of the tree; a walk down from the root makes as many visits as there are nodes
 //! refit   depth first, a node after all nodes below it: read the boxes of all triangles in its leaves; unite those of
 //!         each leaf (a short leaf repeats its last box, so that eight are united); quantise; hand the union of all to
 //!         the parent
@@ -91,8 +91,8 @@ impl Bvh<'_> {
     }
 }
 
-/// Checks what a refit relies on: as many nodes are met as there are, each leaf lies among the ids, fine sides are
-/// those of their node. Boxes are not checked, as they are replaced. Returns the levels of nodes and the SAH cost.
+/// Checks what a refit relies on: a walk makes as many visits as there are nodes, each leaf lies among the ids, fine
+/// sides are those of their node. Boxes are not checked, as they are replaced. Returns the levels of nodes and the SAH cost.
 struct CheckNodes<'b>(&'b Bvh<'b>);
 
 impl Kernel for CheckNodes<'_> {

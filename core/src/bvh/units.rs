@@ -6,7 +6,7 @@
 //! ```text
 //! each crowded bin is a unit; balance = 0
 //! for each other bin: add it to the unit
-//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; above 0 and at a seam: 0
+//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; at a seam, at most 0
 //!     if left is not negative, and no bin follows or left and the rest are enough for a root: end the unit,
 //!         balance = left
 //! ```
