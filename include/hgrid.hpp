@@ -834,8 +834,8 @@ public:
     /// A mesh of a container of vertices and one of indices.
     ///
     /// Vertices are structs that begin with three floats (anything may follow), classes that begin with
-    /// floats x, y, z or have floats in an array that `[]` gives, arrays of floats, or floats alone, three for
-    /// each vertex. All else does not compile.
+    /// floats x, y, z or with an array of floats that `[]` gives, arrays of floats, or floats alone, three for
+    /// each vertex. All else does not compile; that such an array is the first member, the compiler cannot see.
     /// If the floats are elsewhere in the struct: `field(vertices, &vertex::position)`.
     ///
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;

@@ -53,9 +53,9 @@ pub struct hgrid_boxes {
     /// hit.
     ///
     /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range,
-    /// infinite or NaN is no hit. The test is called on the thread that queries, on several at once if several query, for shapes
-    /// whose box the ray meets and perhaps some others, roughly front to back, and for each shape at most once for each
-    /// ray. It may query this tree and others, and must not be left by `longjmp` or by a C++ exception.
+    /// infinite or NaN is no hit. The test is called on the thread that queries, on several at once if several query,
+    /// for shapes whose box the ray meets and perhaps some others, roughly front to back, and for each shape at most
+    /// once for each ray. It may query this tree and others, and must not be left by `longjmp` or by a C++ exception.
     pub test: Option<
         unsafe extern "C" fn(
             context: *mut c_void,

@@ -40,9 +40,8 @@ pub struct ClosestPoint {
 impl ClosestPoint {
     /// The point of one triangle that is closest to a point. [`Grid::closest_point`] is the closest of these.
     ///
-    /// `None` if a coordinate is not finite, or one of the triangle is beyond [`MAX_COORDINATE`](crate::MAX_COORDINATE),
-    /// or the distance is more than `f32::MAX`. A triangle without area has
-    /// points, too.
+    /// `None` if a coordinate is not finite, a corner is beyond [`MAX_COORDINATE`](crate::MAX_COORDINATE), or the
+    /// distance is above `f32::MAX`. A triangle without area has points, too.
     ///
     /// ```
     /// use hgrid_core::ClosestPoint;

@@ -33,8 +33,8 @@
 //! N          those of T and of s det, a product 1, a difference 1                       54 u G E^2 + 108 u |s| E^2
 //! ```
 //!
-//! The f64 test moves the corners across the ray, on each of two axes by at most m = 7 * 2^-53 times the distance of the
-//! farthest corner. That distance exceeds neither the filter's M nor its X. Depths stay what they are.
+//! The f64 test moves the corners across the ray, on each of two axes by at most m = 7 * 2^-53 times the distance of
+//! the farthest corner. That distance exceeds neither the filter's M nor its X. Depths stay what they are.
 //!
 //! **Met before the start.** If no corner lies before the start, neither does the point where the ray meets the moved
 //! triangle: N / det of that is not negative. Else the test decides exactly, on the triangle as it is. The move changes

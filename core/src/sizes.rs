@@ -191,9 +191,9 @@ fn fits(
     let missing = |region, needed: usize, available: usize| {
         Error::out_of_memory(region, needed as u64, available as u64)
     };
-    // The bound of a method with a pool says little about the need of a mesh.
-    let has_pool = !matches!(config.method(), Method::OneLevel | Method::Fixed);
-    if has_pool && !needed.is_exact {
+    // The bounds of the other methods say little about the need of a mesh: a plan in the scratch says it.
+    let needs_plan = !matches!(config.method(), Method::OneLevel | Method::Fixed);
+    if needs_plan && !needed.is_exact {
         return Err(missing(Region::Scratch, needed.scratch_bytes, scratch.len()));
     }
     if needed.index_bytes > index_bytes {

@@ -4,7 +4,7 @@
 //! complete, or it is what it was before.
 
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
@@ -27,7 +27,7 @@ pub(crate) fn open(path: &Path) -> Result<File> {
 
 /// Writes a file under another name and then renames it, so that a full disk leaves the older file of its name.
 ///
-/// Pipes and devices are written to as they are. So is a file in a folder where no other file can be made.
+/// Pipes and devices are written to as they are. So is a file in a folder where others may not be made or renamed.
 ///
 /// # Errors
 /// The errors of writing, with the file's name.
@@ -39,9 +39,12 @@ fn replace(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> io
     // Replace what a link leads to, not the link.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let old = fs::metadata(&path).ok();
-    let is_file = old.as_ref().is_none_or(Metadata::is_file);
-    let Some(mut new) = is_file.then(|| beside(&path)).and_then(Result::ok) else {
+    if path.is_symlink() || !old.as_ref().is_none_or(Metadata::is_file) {
         return content(&mut File::create(path)?);
+    }
+    let mut new = match beside(&path) {
+        Err(error) if is_forbidden(&error) => return content(&mut File::create(path)?),
+        new => new?,
     };
     if let Some(old) = old {
         // A file that may not be written to may not be replaced.
@@ -49,8 +52,15 @@ fn replace(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> io
         new.as_file().set_permissions(old.permissions())?;
     }
     content(new.as_file_mut())?;
-    new.persist(path)?;
-    Ok(())
+    match new.persist(&path) {
+        Ok(_) => Ok(()),
+        Err(refused) => fs::copy(refused.file.path(), &path).map(drop),
+    }
+}
+
+/// Returns true if a folder takes no new file from this user, whatever the file is.
+fn is_forbidden(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
 }
 
 /// Makes a file in the folder of another one, with the permissions of any new file.
@@ -73,7 +83,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         let fails =
-            |file: &mut File| file.write_all(b"half").and(Err(io::ErrorKind::StorageFull.into()));
+            |file: &mut File| file.write_all(b"half").and(Err(ErrorKind::StorageFull.into()));
         assert!(write(&path, fails).is_err() && !path.exists());
         write(&path, |file| file.write_all(b"whole")).unwrap();
         let error = format!("{:#}", write(&path, fails).unwrap_err());
@@ -103,5 +113,9 @@ mod tests {
         write(&link, |file| file.write_all(b"new")).unwrap();
         assert!(link.is_symlink() && mode(&path) & 0o777 == 0o640);
         assert_eq!(fs::read(&path).unwrap(), b"new");
+        // A link to what is not there makes that file.
+        fs::remove_file(&path).unwrap();
+        write(&link, |file| file.write_all(b"first")).unwrap();
+        assert!(link.is_symlink() && fs::read(&path).unwrap() == b"first");
     }
 }

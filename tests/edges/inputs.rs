@@ -2,7 +2,7 @@
 
 use hgrid_core::{
     BatchField, Block, BuildFlags, Config, ConfigField, Error, IndexType, Instance, MAX_COORDINATE,
-    MeshField, Method, Object, Parameters, Ray, Scene, Sizes, Strided, TriangleMesh, fit, sizes,
+    MeshField, Method, Object, Parameters, Ray, Scene, Sizes, Strided, TriangleMesh, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};

@@ -334,6 +334,26 @@ fn filters_are_shown_nothing_behind_a_hit() {
             assert_eq!(hit.t.to_bits(), 1.0_f32.to_bits());
             assert!(shown.is_sorted_by(|before, after| before > after), "{shown:?}");
         }
+
+        // The same behind a hit of another scene: two instances there, both a step behind it.
+        let step = 2.0_f64.powi(-23);
+        let config = Config::default();
+        let inner = Built::scene(&[at(-step), at(-step)], objects, &config).unwrap();
+        let inner = inner.open(objects).unwrap();
+        let both = [objects[0], Object::Scene(&inner)];
+        let instances = [Instance::new(0), Instance::new(1)];
+        let built = Built::scene(&instances, &both, &config).unwrap();
+        let scene = built.open(&both).unwrap();
+        let mut shown = Vec::new();
+        let mut filter = |_: usize, hit: &SceneHit| {
+            shown.push(hit.t);
+            Verdict::Accept
+        };
+        let mut options = SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
+        let ray = RayF64::new([0.2, 0.2, 1.0], [0.0, 0.0, -1.0]);
+        assert!(scene.intersect_with(&ray, &mut options).is_some());
+        let after = shown.iter().skip_while(|t| **t > 1.0).filter(|t| **t > 1.0);
+        assert_eq!(after.count(), 0, "{shown:?}");
     });
 }
 

@@ -204,9 +204,9 @@ fn run(
         *slot = finite_ids.next().or_bug("fewer triangles than were counted").unwrap_or_default();
     }
     debug_assert!(finite_ids.next().is_none(), "more triangles than were counted");
-    let root = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
+    let whole = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
     let mut looks = looks(mesh.triangle_count());
-    builder.grid(ids, &root, 0, &mut looks, scratch)?;
+    builder.grid(ids, &whole, 0, &mut looks, scratch)?;
     let words = builder.pool.offset()?;
 
     let mut header = Header::new(Parameters::Recursive { density, depth }, mesh, lattice);

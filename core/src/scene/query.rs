@@ -298,7 +298,9 @@ impl InstanceSearch<'_, '_> {
     /// Asks an instance whose box the ray meets.
     fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
-        if self.best.is_some_and(|best| !hit.is_closer(&best)) {
+        // The range in the object may end a step behind the limit.
+        let is_behind = hit.t > self.limit;
+        if is_behind || self.best.is_some_and(|best| !hit.is_closer(&best)) {
             return Outcome::Unchanged;
         }
         (self.best, self.limit) = (Some(hit), hit.t);
@@ -345,7 +347,7 @@ impl InstanceSearch<'_, '_> {
             let limit = self.limit;
             show = move |_: usize, hit: &Hit| {
                 let hit = to_scene(hit);
-                // The range in the object ends a step farther. `offer` drops this hit.
+                // `offer` drops this hit.
                 if hit.t > limit { Verdict::Accept } else { filter(&hit) }
             };
             options.filter = Some(&mut show);

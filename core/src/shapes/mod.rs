@@ -104,8 +104,8 @@ pub struct ShapeHit {
 /// Tests a shape. The test receives the number of a shape and the ray; `t_max` is that of the closest hit so far. It
 /// returns the hit, if any.
 ///
-/// An answer outside the range, infinite or NaN is no hit. The test may be asked about a shape that the ray does not meet; it
-/// is asked about each shape at most once for a ray, roughly front to back. It may query this tree
+/// An answer outside the range, infinite or NaN is no hit. The test may be asked about a shape that the ray does not
+/// meet; it is asked about each shape at most once for a ray, roughly front to back. It may query this tree
 /// and others. In a batch, calls for different rays alternate.
 ///
 /// All queries find the same hits if every hit lies inside the box of its shape, rounding included, and if the answer

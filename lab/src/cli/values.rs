@@ -21,7 +21,7 @@ where
         let number = word.parse::<i64>().ok().and_then(|number| T::try_from(number).ok());
         number.filter(|number| range.contains(number)).ok_or_else(|| {
             let (start, end) = (range.start(), range.end().to_string());
-            let is_too_large = word.parse::<u64>().is_ok_and(|number| number > u32::MAX.into());
+            let is_too_large = word.parse::<u128>().is_ok_and(|number| number > u32::MAX.into());
             // Users need not know the greatest number of 32 bits, unless they name a greater one.
             if end == u32::MAX.to_string() && !is_too_large {
                 format!("it is no whole number, {start} or more")

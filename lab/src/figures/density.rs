@@ -97,12 +97,12 @@ impl Curves {
     /// If the mesh can have none of the densities, or all make the same grids of it.
     pub(super) fn check(&self) -> Result<()> {
         ensure!(
-            self.curves().next().is_some(),
-            "figure 1 would show nothing, because {SAME}: name a larger scene, or densities that differ more"
+            self.methods.iter().any(|curve| curve.points().next().is_some()),
+            "figure 1 would show nothing, because {TOO_DENSE}: name smaller --densities"
         );
         ensure!(
             self.have_points(),
-            "figure 1 would show nothing, because {TOO_DENSE}: name smaller --densities"
+            "figure 1 would show nothing, because {SAME}: name a larger scene, or densities that differ more"
         );
         Ok(())
     }
@@ -118,9 +118,10 @@ impl Curves {
 
     /// Returns a line for each reason to leave methods or densities out of the charts; none if they show all.
     pub(super) fn notes(&self) -> Vec<String> {
-        let flat = self.methods.iter().filter(|curve| !curve.is_curve());
-        let flat: Vec<_> = flat.map(|curve| &*curve.method).collect();
-        let too_dense: Vec<_> = self.curves().filter_map(Curve::left_out).collect();
+        let is_flat = |curve: &&Curve| !curve.is_curve() && curve.left_out().is_none();
+        let flat = self.methods.iter().filter(is_flat).map(|curve| &*curve.method);
+        let flat: Vec<_> = flat.collect();
+        let too_dense: Vec<_> = self.methods.iter().filter_map(Curve::left_out).collect();
         let reasons = [(SAME, flat.join(", ")), (TOO_DENSE, too_dense.join("; "))];
         let reasons = reasons.into_iter().filter(|(_, what)| !what.is_empty());
         reasons.map(|(why, what)| format!("left out of figure 1, because {why}: {what}")).collect()
