@@ -140,6 +140,13 @@ impl Roots<'_> {
     ///
     /// A unit that is still too large after [`DIVISIONS`] divisions is halved by ids, which makes worse boxes.
     fn cut(&mut self, range: Range<usize>) {
+        // In order, a cut ends after at most one split for each bit of a key, and one for each halving.
+        debug_assert!(
+            self.entries
+                .get(range.clone())
+                .is_some_and(|unit| unit.is_sorted_by_key(|entry| entry[0])),
+            "keys out of order"
+        );
         let mut start = range.start;
         while start < range.end {
             let mut end = range.end;
