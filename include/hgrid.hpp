@@ -323,7 +323,7 @@ enum class culling : std::uint32_t {
     front = HGRID_CULL_FRONT,
 };
 
-/// What a blob is built over: `blob_info::content` is the number of one of these.
+/// The things that a blob can be built over. `blob_info::content` holds the number of one of them.
 enum class content : std::uint32_t {
     /// The triangles of a mesh, for `view::open`: `HGRID_CONTENT_TRIANGLES`
     triangles = HGRID_CONTENT_TRIANGLES,

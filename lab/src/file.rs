@@ -1,7 +1,7 @@
 //! Files that are read, and files that are written.
 //!
 //! A file that is opened can be read twice, once to recognise it and once for its content. A file that is written is
-//! complete, or it is what it was before.
+//! complete, or it is what it was before, if its folder allows that.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind};
@@ -103,7 +103,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [path, link] = ["a", "link"].map(|name| folder.path().join(name));
         write(&path, |file| file.write_all(b"old")).unwrap();
-        // What any program's new file has.
+        // A file that any other program makes has the usual permissions.
         let usual = folder.path().join("usual");
         fs::write(&usual, "").unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();

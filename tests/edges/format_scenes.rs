@@ -154,7 +154,7 @@ fn check_packed(blob: Bytes<'_>, outer: &Scene<'_>, inner: &Scene<'_>, grids: &[
     let references = sections.next(4 * count);
     let mut references = (0..count).map(|number| blob.u32(references + 4 * number) as usize);
 
-    // What each member is: one of the grids, or the inner scene.
+    // Each member is one of the grids, or the inner scene.
     let (mut at, mut members) = (sections.at, Vec::new());
     for number in 0..=head.triangle_count {
         let member = Bytes(&blob.0[at..]);

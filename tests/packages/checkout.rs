@@ -148,7 +148,7 @@ fn a_cross_build_gets_a_static_library_for_the_target() {
     assert!(names.len() == 1 && names[0].file_name() == "libhgrid.a", "{names:?}");
 }
 
-/// What CMake knows of clang with Microsoft's ABI: MSVC is not set.
+/// These settings imitate clang with Microsoft's ABI, for which CMake does not set MSVC.
 const CLANG_ON_WINDOWS: &str = "
 set(UNIX FALSE)
 set(WIN32 TRUE)

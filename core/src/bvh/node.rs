@@ -6,8 +6,9 @@
 //! side of a box  = origin + bound * 2^(exponent - 127), on each axis
 //! child s is       an inner node   if bit s of inner is set: nodes[child + set bits below s]
 //!                  a leaf          if counts[s] > 0: ids[first + counts of the leaves before s ..]
-//!                  not there       otherwise; its box is inside out, so that single rays hardly ever meet it; if the
-//!                                  error of a far ray turns the box round, they find a leaf without ids
+//!                  not there       otherwise; its low sides lie above its high ones, so that single rays hardly ever
+//!                                  meet it; a ray from far away may, as its margin is large, and finds a leaf without
+//!                                  ids
 //! ```
 //!
 //! A build makes the quantised box a sixty-fourth of a step larger than the exact one on each side. Rounding takes a

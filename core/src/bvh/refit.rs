@@ -92,7 +92,8 @@ impl Bvh<'_> {
 }
 
 /// Checks what a refit relies on: a walk makes as many visits as there are nodes, each leaf lies among the ids, fine
-/// sides are those of their node. Boxes are not checked, as they are replaced. Returns the levels of nodes and the SAH cost.
+/// sides are those of their node. Boxes are not checked, as they are replaced. Returns the levels of nodes and the SAH
+/// cost.
 struct CheckNodes<'b>(&'b Bvh<'b>);
 
 impl Kernel for CheckNodes<'_> {

@@ -347,7 +347,7 @@ impl InstanceSearch<'_, '_> {
             let limit = self.limit;
             show = move |_: usize, hit: &Hit| {
                 let hit = to_scene(hit);
-                // `offer` drops this hit.
+                // Accept what lies behind the limit without asking: `offer` drops it.
                 if hit.t > limit { Verdict::Accept } else { filter(&hit) }
             };
             options.filter = Some(&mut show);

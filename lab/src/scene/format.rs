@@ -56,7 +56,7 @@ impl Format {
         let mut start = Vec::new();
         file.by_ref().take(512).read_to_end(&mut start).context("cannot read it")?;
         let (named, length) = (Self::named(path), file.metadata().context("cannot read it")?.len());
-        // Its first bytes may be any words, those of other formats, too.
+        // A binary STL file may begin with any words, also with the mark of another format.
         if named == Some(Self::Stl) && stl::is_binary(&start, length) {
             return Ok(Self::Stl);
         }

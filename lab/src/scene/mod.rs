@@ -164,10 +164,7 @@ impl Scene {
     /// Returns the number of triangles that are not finite, which every build leaves out.
     #[must_use]
     pub fn not_finite_count(&self) -> usize {
-        let corners = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|vertex| self.positions.get(vertex as usize).copied());
-            Some([a?, b?, c?])
-        };
+        let corners = |triangle| corners_of(&self.positions, triangle);
         self.indices.iter().filter_map(corners).filter(|triangle| !is_finite(triangle)).count()
     }
 
@@ -272,6 +269,12 @@ pub(crate) fn quoted(word: &str) -> String {
     let start: String = word.chars().take(40).collect();
     let rest = if start.len() < word.len() { "..." } else { "" };
     format!("`{start}{rest}`")
+}
+
+/// Returns the corners of a triangle; none if a vertex is not there.
+fn corners_of(positions: &[[f32; 3]], triangle: &[u32; 3]) -> Option<Triangle> {
+    let [a, b, c] = triangle.map(|vertex| positions.get(vertex as usize).copied());
+    Some([a?, b?, c?])
 }
 
 /// Returns true if the core takes a triangle as finite.

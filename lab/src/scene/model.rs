@@ -12,7 +12,7 @@ use core::fmt;
 use anyhow::{Context as _, Result};
 use hgrid_core::{Block, Config, Instance, Object, Scene as Instances};
 
-use super::Bounds;
+use super::{Bounds, corners_of};
 use crate::plural::counted;
 use crate::vector::{Vector, dot, round};
 
@@ -41,15 +41,11 @@ impl Mesh {
 
     /// Tells of each vertex whether a finite triangle uses it.
     fn is_used(&self) -> Vec<bool> {
-        let corners = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|vertex| self.positions.get(vertex as usize).copied());
-            Some([a?, b?, c?])
+        let is_finite = |triangle: &&[u32; 3]| {
+            corners_of(&self.positions, triangle).is_some_and(|corners| super::is_finite(&corners))
         };
         let mut is_used = vec![false; self.positions.len()];
-        for triangle in &self.indices {
-            if !corners(triangle).is_some_and(|corners| super::is_finite(&corners)) {
-                continue;
-            }
+        for triangle in self.indices.iter().filter(is_finite) {
             for &vertex in triangle {
                 is_used[vertex as usize] = true;
             }
