@@ -18,7 +18,7 @@
 //!
 //! Sides keep a distance from the exact box, as a ray along a side would otherwise cross it at distance 0
 //! ([`slab`](super::slab)): a build moves them by a 512th of a step, and by a bit of the coordinate; `validate` demands
-//! a 2048th. Rounding needs no other margin here: a side minus an origin is rounded once, relative to the result.
+//! a 1024th. Rounding needs no other margin here: a side minus an origin is rounded once, relative to the result.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
@@ -49,7 +49,7 @@ pub(crate) const fn most_fine(triangles: u64) -> u64 {
 /// The distance of sides from the exact box in a build, in steps.
 const MARGIN: f32 = 1.0 / 512.0;
 /// The distance that they must have.
-const LEAST_MARGIN: f64 = 1.0 / 2048.0;
+const LEAST_MARGIN: f64 = 1.0 / 1024.0;
 
 /// Least x, y, z, then greatest x, y, z of each child.
 #[repr(C)]
@@ -247,6 +247,21 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn sides_that_are_too_close_hold_less_than_the_box() {
+        let (node, _, boxes) = node(&mut 5, 1.0, Vec3A::ZERO);
+        let (min, step) = (boxes[0].min.as_dvec3(), DVec3::from(node.steps().map(f64::from)));
+        for (part, is_enough) in [(1.0 / 900.0, true), (1.0 / 1100.0, false)] {
+            let mut sides = sides_of(&node, &boxes);
+            for axis in 0..3 {
+                sides.sides[axis][0] = (min - step * part).as_vec3().to_array()[axis];
+            }
+            let (low, _) = sides.holds(&node, 0);
+            let held = low.cmple(min);
+            assert_eq!([held.x, held.y, held.z], [is_enough; 3], "{part} of a step");
         }
     }
 
