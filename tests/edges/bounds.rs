@@ -64,7 +64,7 @@ fn row() -> Mesh {
 }
 
 /// Returns rays along axes, rays through the middle, and some others.
-fn rays() -> Vec<Ray> {
+pub(crate) fn rays() -> Vec<Ray> {
     let mut random = Random(11);
     let mut rays: Vec<_> = (0..24)
         .map(|_| {
@@ -108,7 +108,7 @@ fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
 }
 
 /// Returns the most nodes that a tree can have, rounded up (core/src/bvh/layout.rs).
-fn tree_nodes(triangles: u64) -> u64 {
+pub(crate) fn tree_nodes(triangles: u64) -> u64 {
     triangles * 2457 / 16_800 + 11 * (5 * (triangles / 4097) + 1) / 7 + 4
 }
 

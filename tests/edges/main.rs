@@ -11,5 +11,6 @@ mod packed;
 mod printed;
 mod progress;
 mod rays;
+mod scene_bounds;
 mod scenes;
 mod shapes;
