@@ -176,7 +176,7 @@ pub enum Command {
     /// Deforms a mesh, or moves instances of it, and builds and renders it again for every frame, in the same memory
     #[command(after_help = [ANIMATE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Animate(AnimateArgs),
-    /// Measures every method and other ray tracers, its peers, over the same rays
+    /// Measures every method, and ray tracers of other libraries (peers), over the same rays
     #[command(after_help = [COMPARE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Compare(CompareArgs),
     /// Writes the tables and charts of README.md and docs/ from the results in lab/results
@@ -216,7 +216,7 @@ pub struct FiguresArgs {
     /// The scene of figure 1 [default: the first one]
     #[arg(long, value_name = "SCENE")]
     pub figure1: Option<OsString>,
-    /// The densities of figure 1, between commas; each is a number above 0
+    /// The densities of figure 1, separated by commas; each is a number above 0
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_delimiter = ',', value_parser = density,
           default_values_t = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])]
     pub densities: Vec<f32>,
@@ -307,16 +307,16 @@ pub struct CompareArgs {
     /// Mesh files or procedural:NAME:TRIANGLES
     #[arg(required = true)]
     pub scenes: Vec<OsString>,
-    /// The structures of hgrid, between commas [default: all]
+    /// The methods of hgrid, separated by commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     pub methods: Vec<Method>,
     /// For `bvh`: `high` takes a longer build, after which most rays are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
     pub quality: Option<Quality>,
-    /// The other structures, between commas [default: all that this program has]
+    /// The structures of other libraries, separated by commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
-    /// The rays and points to ask for, between commas [default: all]
+    /// The rays and points to ask for, separated by commas [default: all]
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
     /// Compare scenes of this many instances of the mesh, at most 10000000 (`bvh` and Embree only); 0 compares the mesh
@@ -421,7 +421,7 @@ impl FirstBuildArgs {
 /// The methods of a race, and its repetitions.
 #[derive(Debug, Clone, Args)]
 pub struct Race {
-    /// The structures to build, between commas [default: all]
+    /// The methods to build, separated by commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     methods: Vec<Method>,
     /// Build and render so many times, 1 to 1000, taking turns, and report the medians

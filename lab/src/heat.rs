@@ -71,7 +71,7 @@ pub struct Picture {
 }
 
 /// Makes a picture of the costs of the rays of a square picture, with a colour bar if there is room. The
-/// colours end at `top` or the next round number, or by default at the cost that 99 of 100 rays stay below.
+/// colours end at `top`, or by default at the cost that 99 of 100 rays do not exceed, rounded up to a round number.
 /// The number at the end is returned with the picture.
 ///
 /// # Errors

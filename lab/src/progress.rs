@@ -1,9 +1,8 @@
 //! A progress bar for long work only.
 //!
-//! The bar appears on standard error after a second, only if that is a terminal, and disappears when the work
-//! is done. Standard output belongs to the results, and a bar that flashes by is of no use. Generating,
-//! loading and measuring share it. If standard error is a file or a pipe, steps of a measurement get a line in place of
-//! the bar, one a second at most.
+//! The bar appears on standard error after a second, only if that is a terminal, and disappears when the work is done.
+//! Generating, loading and measuring share it. If standard error is a file or a pipe, steps of a measurement get a line
+//! in place of the bar, one a second at most.
 
 use core::cell::Cell;
 use core::fmt;

@@ -3,7 +3,7 @@
 //! ```text
 //! World      closest hits       any hit               surface
 //! mesh       a tile together    all rays together     the mesh's
-//! instances  a tile together    all rays together     the scene's, with origins as far off as rays in f32 need
+//! instances  a tile together    all rays together     the scene's, with origins far enough off it for rays in f32
 //! ```
 
 use hgrid_core::{

@@ -85,8 +85,8 @@ pub enum View {
 }
 
 impl View {
-    /// The default view of a measurement: from the front, or from above if the
-    /// scene is flat.
+    /// The default view of a measurement: from the front, or if the scene is flat, from the front right and a little
+    /// above.
     #[must_use]
     pub fn of(bounds: Bounds, up: Up) -> Self {
         if is_flat(bounds, up) { Self::ThreeQuarter } else { Self::Front }

@@ -22,7 +22,7 @@ Examples:
   hgrid bunny.ply --samples 64 --ao 2        smooth, in a few times as long
   hgrid bunny.ply --samples 1 --ao 0 --no-shadows       as fast as it gets
   hgrid bunny.ply+stadium.ply                the first in the middle of the second
-  hgrid render stadium.ply --view 40,15      from the right, a little above
+  hgrid render stadium.ply --view 40,15      from the front right, a little above
   hgrid render sponza.ply --eye 0,3,0 --target 10,3,0 --fov 60
   hgrid render bunny.ply --quality high      a longer build, most rays are faster
   hgrid render bunny.ply --method fixed --macrocell-factor 4
@@ -124,8 +124,8 @@ const VIEWS: &str = "\
 Views:
   front, back, left, right, top, bottom, three-quarter,
   or AZIMUTH,ELEVATION in degrees: 0,0 is the front, 90,0 the right, 0,90 the top.
-  Measurements without one see scenes from the front and flat ones from above.
-  Instead of a view: a point to look --eye from, and one to look at (--target).
+  Without a view, measurements see a scene from the front, and a flat one from three-quarter.
+  Instead of a view, --eye X,Y,Z is the point to look from, and --target X,Y,Z the point to look at.
 Named views:
 ";
 

@@ -31,7 +31,7 @@ pub struct RenderArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub picture: Picture,
-    /// Meaning of the colours
+    /// What the colours show
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
     /// Rays through each pixel, against jagged edges and noise, 1 to 1024 [default: 4; 1 for the four grids of the
@@ -39,8 +39,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
           value_parser = whole(1..=1024_u16))]
     samples: Option<u16>,
-    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: as many as make 16 a pixel, and
-    /// at least 1; 0 for the four grids of the paper]
+    /// Rays of ambient occlusion from each sample, 0 for none, at most 1024 [default: 16 divided by --samples, and at
+    /// least 1; 0 for the four grids of the paper]
     #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
           value_parser = whole(0..=1024_u16))]
     ao: Option<u16>,
@@ -50,7 +50,8 @@ pub struct RenderArgs {
     /// For heat: the work that is shown [default: cost]
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,
-    /// For heat: the number that is red, 1 or more, to compare pictures [default: what 99 of 100 rays take]
+    /// For heat: the number that is red, 1 or more, rounded up to a round one; the same in several pictures makes them
+    /// comparable [default: what 99 of 100 rays take at most]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = whole(1..=u32::MAX))]
     pub heat_top: Option<u32>,
     /// The structure to build

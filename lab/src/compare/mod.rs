@@ -1,4 +1,4 @@
-//! hgrid and other ray tracers, its peers, over the same rays: the `compare` command.
+//! hgrid and the ray tracers of other libraries (peers), over the same rays: the `compare` command.
 //!
 //! ```text
 //! workloads: the rays, and the answers of hgrid to them
@@ -9,9 +9,9 @@
 //! race: all systems in turn --> numbers --> tables, ratios, charts
 //! ```
 //!
-//! The peers need libraries of the system; everything else is always compiled. Without the features `peers`
-//! and `embree` the command says how to build with them. docs/performance.md says how each system is set up
-//! and measured.
+//! The peers are behind the features `peers` and `embree`, because Embree needs its library on the system and tinybvh a
+//! C++ compiler. Without these features the command says how to build with them. docs/performance.md says how each
+//! system is set up and measured.
 
 pub mod agreement;
 mod charts;
