@@ -3,9 +3,9 @@
  *
  * It builds a tree, or one of the four grids of the paper "Multi-Level Hashed Grid Construction
  * Methods" (2010), over a triangle mesh, in time proportional to the number of triangles and in
- * memory that you bring, and traces rays through it. A tree is called a grid, too, wherever this file
- * does not speak of the grids of the paper. This file is the whole manual. It is made from the
- * sources in capi/: change it there.
+ * memory that you bring, and traces rays through it. In this file a grid is any structure that a
+ * build makes, a tree, too; only "the grids of the paper" are the other four. This file is the whole
+ * manual. It is made from the sources in capi/: change it there.
  *
  * Three calls
  * -----------
@@ -14,19 +14,27 @@
  *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one, and
  *                     hgrid_occluder names one
  *
- * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n,
- * hgrid_occluder_n; against shapes and in scenes hgrid_intersect_shapes_n, hgrid_occluded_shapes_n,
- * hgrid_intersect_scene_n and hgrid_occluded_scene_n. Every triangle along a ray: hgrid_intersect_all.
- * The nearest point: hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are
- * options of these. hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for
- * this one, and the best grid for a budget. hgrid_config has the fields for a build on your threads, and
- * for its progress. hgrid_surface_at, and in scenes hgrid_scene_surface_at, returns the normal of a hit
- * and the origins of rays that leave it.
- * hgrid_join joins several meshes for one grid, and hgrid_locate tells which of them was hit. Trees of
- * your own shapes begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids
- * that are stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for
- * scenes with all that they show hgrid_pack_scene; hgrid_inspect returns statistics of a grid.
- * hgrid_refit fits a tree to vertices that moved.
+ * More calls
+ * ----------
+ *   hgrid_intersect_n, hgrid_occluded_n,       many rays at once, from your structs into your structs;
+ *   hgrid_occluder_n                           against shapes and in scenes: hgrid_intersect_shapes_n,
+ *                                              hgrid_occluded_shapes_n, hgrid_intersect_scene_n,
+ *                                              hgrid_occluded_scene_n
+ *   hgrid_intersect_all                        every triangle along a ray
+ *   hgrid_closest_point                        the point of the mesh that is nearest to a point
+ *   hgrid_surface_at, hgrid_scene_surface_at   the normal of a hit, and origins of rays that leave it
+ *   hgrid_bound, hgrid_sizes, hgrid_fit        memory for any mesh, for this one; the best grid for a
+ *                                              budget
+ *   hgrid_refit                                fits a tree to vertices that moved
+ *   hgrid_join, hgrid_locate                   several meshes in one grid; which of them was hit
+ *   hgrid_build_shapes                         a tree of your own shapes
+ *   hgrid_build_scene                          a scene of instances
+ *   hgrid_open, hgrid_peek, hgrid_validate,    stored grids; with the mesh in one file: hgrid_pack and
+ *   hgrid_pack, hgrid_mesh_of                  hgrid_mesh_of; scenes with all they show: hgrid_pack_scene
+ *   hgrid_inspect                              statistics of a grid
+ *
+ * Masks, culling, a triangle to skip, filters and counters are options of queries. hgrid_config has the
+ * fields for a build on your threads, and for its progress.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -68,15 +76,16 @@
  * link a library with the feature malloc, are compiled with -DHGRID_MALLOC (or define it before anything
  * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
- * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh with
- * that many triangles, with the default configuration; hgrid_bound takes any configuration, and hgrid_sizes with
- * scratch plans the grid and returns the exact size. Where the system provides memory page by page (on Linux mmap, and
- * large blocks of aligned_alloc), an index that is too large costs addresses but no memory, because
- * pages that are never touched are never allocated. There, call hgrid_bound or hgrid_sizes without
- * scratch, build in that much, and copy the report's index_bytes to a smaller block if you like. With
- * scratch hgrid_sizes is exact, but takes half as long as the build, or as long (bvh, recursive). Use it
- * where every byte is real memory: without virtual memory, or where memory is charged when it is
- * reserved (Windows, and Linux without overcommit).
+ * How large are the two regions?
+ *
+ * - Static arrays: HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh
+ *   with that many triangles, with the default configuration.
+ * - Where the system provides memory page by page (on Linux mmap, and large blocks of aligned_alloc):
+ *   build in as much as hgrid_bound or hgrid_sizes without scratch says. Pages that the build does not
+ *   touch take no memory. Copy the report's index_bytes to a smaller block if you like.
+ * - Where every byte is real memory (no virtual memory, or memory that is charged when it is reserved, as
+ *   on Windows and on Linux without overcommit): hgrid_sizes with scratch plans the grid and returns the
+ *   exact size of the index. This takes half as long as the build, or as long (bvh, recursive).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
@@ -188,13 +197,13 @@
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
  * There is no epsilon: the error of a hit is relative to the ray and the triangle (hgrid_hit has the
- * bound), and whether t lies in the range is decided exactly. So meshes of any scale from 1e-30 to 1e30
- * work; between 1e-15 and 1e15 rays are faster, as tests in float replace most tests in double. Only IEEE
- * + - * / and square roots are used, in a fixed order: the same input gives the same blobs and hits, bit
- * for bit, on every machine. They are rounded to nearest, as in every C program that does not call
- * fesetround: another mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86),
- * inputs and intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other
- * hits.
+ * bound), and whether t lies in the range is decided exactly. So meshes of any scale from 1e-30 to
+ * 1e30 work; between 1e-15 and 1e15 rays are faster, as tests in float replace most tests in double.
+ * Only IEEE + - * / and square roots are used, in a fixed order: the same input gives the same blobs
+ * and hits, bit for bit, on every machine (but hgrid_occluder may name another triangle that blocks).
+ * They are rounded to nearest, as in every C program that does not call fesetround: another mode loses
+ * hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86), inputs and intermediate
+ * results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other hits.
  *
  * Versions
  * --------
@@ -317,7 +326,8 @@
 #define HGRID_METHOD_ONE_LEVEL 1
 
 /**
- * A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
+ * A hashed grid of many small cells, and above it levels of macrocells, whose bits tell which parts of space are
+ * empty.
  *
  * Rays cross empty space in large steps, and the small cells hold few triangles each. Among the four grids
  * of the paper it has the shortest time to a first image. `macrocell_factor` belongs to it.
@@ -361,8 +371,8 @@
  * Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
  * alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
  * (`HGRID_BVH_HIGH_SCRATCH_BOUND` with `HGRID_QUALITY_HIGH`). `hgrid_sizes` without scratch answers with that
- * bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case:
- * tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
+ * bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case,
+ * because tasks fill their parts of the index side by side. In a smaller index one task builds. A tree has no
  * more than 2^31 triangles.
  *
  * The number 5 belonged to a method that was removed, and is not used again.
@@ -561,8 +571,8 @@ typedef void (*hgrid_task)(void *task_context, uint32_t index);
  * `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
  * `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
  *
- * Each macro sets all fields to the paper's values, and to ours where it names none. To change the method later,
- * set `method` and `density`: fields of other methods are ignored.
+ * Each macro sets all fields: to the paper's values, or to hgrid's own where the paper gives none. To change the
+ * method later, set `method` and `density`: fields of other methods are ignored.
  */
 typedef struct hgrid_config {
     /**
@@ -623,8 +633,8 @@ typedef struct hgrid_config {
      * threads, and returns when all these calls have returned: after a join, or after any other
      * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
      * library calls it on the thread that builds, with counts from 2 to `tasks`: several times, one
-     * after the other, or never, as where the mesh or the scratch is small or the processor has no
-     * atomic operations. May be NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has
+     * after the other, or never: where the mesh or the scratch is small, on microcontrollers, and on processors
+     * without atomic operations. May be NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has
      * an example.
      *
      * A task that is called twice, even at the same time, one that is never called, and an index
@@ -669,8 +679,8 @@ typedef struct hgrid_report {
      */
     uint64_t index_bytes;
     /**
-     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough but not exact, before
-     * a build and after it. After a build with several tasks, whether it succeeds or fails, it is the need
+     * Bytes that the scratch region needs: exact for `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED`, and enough,
+     * not always exact, for the others. After a build with several tasks, whether it succeeds or fails, it is the need
      * of a build with one task.
      */
     uint64_t scratch_bytes;
@@ -766,7 +776,7 @@ typedef uint32_t hgrid_verdict;
  * origin. The `t` of a vertex is its coordinate relative to the origin, divided by the direction, both on the axis
  * along which the direction is longest; Z is the largest `t` of the three vertices minus the least. The reported
  * hit is the exact hit of a triangle whose vertices are moved by up to 2^-50 L across the ray, with these errors:
- * `u` and `v` up to 2^-24 + 2^-38 of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
+ * `u` and `v` up to (2^-24 + 2^-38) of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
  * to 2^-149. A vertex is moved alike for all triangles that share it, so no ray passes between them.
  *
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's
@@ -1447,8 +1457,8 @@ typedef struct hgrid_allocator {
 /**
  * Rays that follow one another start near each other: camera rays of a tile, shadow rays and
  * ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64.
- * The best order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of
- * 4 x 4 pixels.
+ * The best order takes tile after tile of 8 x 8 pixels, and within a tile one square of 4 x 4 pixels after the
+ * other.
  */
 #define HGRID_COHERENCE_COHERENT 1
 
@@ -1764,8 +1774,8 @@ hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
  * a little; with bvh and `tasks` above 1 the scratch is larger. The bound exceeds the need by a factor that
- * depends on the method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too
- * large to be of use.
+ * depends on the method: a scan takes a sixth of it or less with one level, six tenths with bvh; with recursive it
+ * is too large to be of use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1825,10 +1835,10 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
 /**
  * Looks for the finest grid that fits into a budget.
  *
- * `fitted` becomes a copy of `config` with a density whose index fits into `index_bytes`, as a rule the highest one.
- * It is found in steps down from that of `config`. A step divides the number of cells by 1.41. A tree
- * (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call does the work of `hgrid_sizes` about a dozen times,
- * and at most 22 times. A density that is too fine for a build counts as one that does not fit.
+ * `fitted` becomes a copy of `config` with a density whose index fits into `index_bytes`, as a rule at most a step
+ * below the highest one. It is found in steps down from that of `config`. A step divides the number of cells by 1.41.
+ * A tree (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call does the work of `hgrid_sizes` about a dozen
+ * times, and at most 22 times. A density that is too fine for a build counts as one that does not fit.
  *
  * The search relies on coarser grids being smaller. But a coarser grid may take more memory than one a few steps
  * finer. Then the density may be several steps too low, and a budget that only the finer grid fits into may be
@@ -2342,8 +2352,9 @@ hgrid_status hgrid_open(const void *blob,
  * the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
  * about as the cost does.
  *
- * A triangle that the build left out, because a coordinate was not finite, must not have become finite. Scenes that
- * show the grid need `hgrid_refit_scene` next, the innermost first: they keep its box.
+ * A triangle that the build left out, because a coordinate was not finite or beyond 2^120, is in no leaf. If it fits
+ * now, the call fails: build again. Scenes that show the grid need `hgrid_refit_scene` next, the innermost first: they
+ * keep its box.
  *
  * `mesh`, `blob` and `grid` may not be NULL. `report` may be NULL. Returns `HGRID_OK` and writes the view
  * to `grid`; or returns the reason, and blob and `grid` are as they were:
@@ -2886,8 +2897,8 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
  *
  * `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
  * The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
- * `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
- * `hit` is NULL, or the hit names nothing in the scene.
+ * `grid` may be NULL. Returns true and has written those that are not NULL; or returns false and has written nothing:
+ * `scene` or `hit` is NULL, or the hit names nothing in the scene.
  *
  * Threads: any number of calls and queries on the same scene at once.
  */

@@ -74,8 +74,9 @@ pub unsafe extern "C" fn hgrid_open(
 /// the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
 /// about as the cost does.
 ///
-/// A triangle that the build left out, because a coordinate was not finite, must not have become finite. Scenes that
-/// show the grid need `hgrid_refit_scene` next, the innermost first: they keep its box.
+/// A triangle that the build left out, because a coordinate was not finite or beyond 2^120, is in no leaf. If it fits
+/// now, the call fails: build again. Scenes that show the grid need `hgrid_refit_scene` next, the innermost first: they
+/// keep its box.
 ///
 /// `mesh`, `blob` and `grid` may not be NULL. `report` may be NULL. Returns `HGRID_OK` and writes the view
 /// to `grid`; or returns the reason, and blob and `grid` are as they were:

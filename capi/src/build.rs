@@ -75,8 +75,8 @@ pub unsafe extern "C" fn hgrid_join(
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
 /// a little; with bvh and `tasks` above 1 the scratch is larger. The bound exceeds the need by a factor that
-/// depends on the method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too
-/// large to be of use.
+/// depends on the method: a scan takes a sixth of it or less with one level, six tenths with bvh; with recursive it
+/// is too large to be of use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -166,10 +166,10 @@ pub unsafe extern "C" fn hgrid_sizes(
 
 /// Looks for the finest grid that fits into a budget.
 ///
-/// `fitted` becomes a copy of `config` with a density whose index fits into `index_bytes`, as a rule the highest one.
-/// It is found in steps down from that of `config`. A step divides the number of cells by 1.41. A tree
-/// (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call does the work of `hgrid_sizes` about a dozen times,
-/// and at most 22 times. A density that is too fine for a build counts as one that does not fit.
+/// `fitted` becomes a copy of `config` with a density whose index fits into `index_bytes`, as a rule at most a step
+/// below the highest one. It is found in steps down from that of `config`. A step divides the number of cells by 1.41.
+/// A tree (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call does the work of `hgrid_sizes` about a dozen
+/// times, and at most 22 times. A density that is too fine for a build counts as one that does not fit.
 ///
 /// The search relies on coarser grids being smaller. But a coarser grid may take more memory than one a few steps
 /// finer. Then the density may be several steps too low, and a budget that only the finer grid fits into may be

@@ -20,8 +20,8 @@ pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
 
 /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
 /// ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64.
-/// The best order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of
-/// 4 x 4 pixels.
+/// The best order takes tile after tile of 8 x 8 pixels, and within a tile one square of 4 x 4 pixels after the
+/// other.
 pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
@@ -54,7 +54,7 @@ pub struct hgrid_ray {
 /// origin. The `t` of a vertex is its coordinate relative to the origin, divided by the direction, both on the axis
 /// along which the direction is longest; Z is the largest `t` of the three vertices minus the least. The reported
 /// hit is the exact hit of a triangle whose vertices are moved by up to 2^-50 L across the ray, with these errors:
-/// `u` and `v` up to 2^-24 + 2^-38 of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
+/// `u` and `v` up to (2^-24 + 2^-38) of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up
 /// to 2^-149. A vertex is moved alike for all triangles that share it, so no ray passes between them.
 ///
 /// The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's

@@ -573,8 +573,8 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
 ///
 /// `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
 /// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
-/// `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
-/// `hit` is NULL, or the hit names nothing in the scene.
+/// `grid` may be NULL. Returns true and has written those that are not NULL; or returns false and has written nothing:
+/// `scene` or `hit` is NULL, or the hit names nothing in the scene.
 ///
 /// Threads: any number of calls and queries on the same scene at once.
 ///

@@ -43,7 +43,8 @@ pub const HGRID_INDEX_U16: u32 = 1;
 /// plans every byte in the scratch before it writes the index.
 pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 
-/// A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
+/// A hashed grid of many small cells, and above it levels of macrocells, whose bits tell which parts of space are
+/// empty.
 ///
 /// Rays cross empty space in large steps, and the small cells hold few triangles each. Among the four grids
 /// of the paper it has the shortest time to a first image. `macrocell_factor` belongs to it.
@@ -81,8 +82,8 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
 /// alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
 /// (`HGRID_BVH_HIGH_SCRATCH_BOUND` with `HGRID_QUALITY_HIGH`). `hgrid_sizes` without scratch answers with that
-/// bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case:
-/// tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
+/// bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case,
+/// because tasks fill their parts of the index side by side. In a smaller index one task builds. A tree has no
 /// more than 2^31 triangles.
 ///
 /// The number 5 belonged to a method that was removed, and is not used again.
@@ -179,8 +180,8 @@ pub struct hgrid_part {
 /// `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
 /// `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
 ///
-/// Each macro sets all fields to the paper's values, and to ours where it names none. To change the method later,
-/// set `method` and `density`: fields of other methods are ignored.
+/// Each macro sets all fields: to the paper's values, or to hgrid's own where the paper gives none. To change the
+/// method later, set `method` and `density`: fields of other methods are ignored.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_config {
@@ -219,8 +220,8 @@ pub struct hgrid_config {
     /// threads, and returns when all these calls have returned: after a join, or after any other
     /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
     /// library calls it on the thread that builds, with counts from 2 to `tasks`: several times, one
-    /// after the other, or never, as where the mesh or the scratch is small or the processor has no
-    /// atomic operations. May be NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has
+    /// after the other, or never: where the mesh or the scratch is small, on microcontrollers, and on processors
+    /// without atomic operations. May be NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has
     /// an example.
     ///
     /// A task that is called twice, even at the same time, one that is never called, and an index
@@ -270,8 +271,8 @@ pub struct hgrid_report {
     pub is_exact: u32,
     /// Bytes that the index region needs; after a build, the size of the blob.
     pub index_bytes: u64,
-    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough but not exact, before
-    /// a build and after it. After a build with several tasks, whether it succeeds or fails, it is the need
+    /// Bytes that the scratch region needs: exact for `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED`, and enough,
+    /// not always exact, for the others. After a build with several tasks, whether it succeeds or fails, it is the need
     /// of a build with one task.
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`. Of joined meshes it is counted

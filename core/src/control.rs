@@ -41,8 +41,8 @@ pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 /// ```
 #[derive(Clone, Copy)]
 pub struct Control<'c> {
-    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): other numbers are clamped. Each
-    /// takes scratch of its own.
+    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): other numbers are clamped. With
+    /// [`Quality::Fast`](crate::Quality::Fast) each takes scratch of its own.
     pub tasks: u32,
     /// Calls the task with every number below the count exactly once, in any order, and
     /// returns when all calls have returned. A build calls it with counts from 2 to

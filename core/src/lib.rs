@@ -53,7 +53,7 @@
 //! The feature `alloc`, off by default, adds `OwnedGrid`, which owns its memory and its mesh and has no lifetime
 //! parameter. It changes nothing else.
 //!
-//! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
+//! Papers that these pages name: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
 #![no_std]
 #![deny(unsafe_code)]

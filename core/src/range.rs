@@ -3,8 +3,8 @@
 //!
 //! The [`filter`](crate::filter) keeps the triangle that a ray leaves, because the line of the ray meets it. The f64
 //! test would compute nearly a whole hit before it rejects that triangle. The first test rejects it, if it is sure. The
-//! second is for rays that only need to know whether anything blocks them: it spares them the f64 test of the triangle
-//! that does.
+//! second is for rays that only need to know whether anything blocks them: a triangle that surely does is not tested in
+//! f64.
 //!
 //! ```text
 //! g, e, f, q, det, U, V and W as in the filter    T = f . q    the line meets the triangle's plane at T / det

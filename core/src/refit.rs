@@ -29,8 +29,8 @@ pub struct Refit {
 /// `cost_before` of the first refit after a build, and build anew once `cost_after` is well above it: times
 /// of rays grow about as the cost does.
 ///
-/// A triangle that the build left out, because a coordinate was not finite, must not have become
-/// finite: it is in no leaf.
+/// A triangle that the build left out, because a coordinate was not finite or beyond
+/// [`MAX_COORDINATE`](crate::MAX_COORDINATE), is in no leaf. If it fits now, the refit fails: build again.
 ///
 /// # Errors
 /// [`Error::CannotRefit`] for a grid of another method and for a packed one ([`pack`](Grid::pack) it after the refit);

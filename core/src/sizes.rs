@@ -12,9 +12,9 @@ use crate::structure;
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a tree half; for recursive grids it is too large to be
-    /// of use. `None` if the configuration is invalid or its method left out, for a tree of more than 2^31 triangles,
-    /// and if the sizes do not fit the machine's address space.
+    /// A one-level grid of a scan takes a sixth of it or less, a tree six tenths; for recursive grids it is too large
+    /// to be of use. `None` if the configuration is invalid or its method left out, for a tree of more than 2^31
+    /// triangles, and if the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -83,9 +83,9 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 
 /// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
 ///
-/// Only [`Method::Bvh`] builds in parallel; for the others this is [`sizes`]. Each task takes scratch of
-/// its own and fills a part of the index: together as much as any mesh with so many triangles takes, so
-/// the answer for several tasks is never exact.
+/// Only [`Method::Bvh`] builds in parallel; for the others this is [`sizes`]. Each task fills a part of the index, and
+/// with [`Quality::Fast`](crate::Quality::Fast) takes scratch of its own. Together they take as much as for any mesh
+/// with so many triangles, so the answer for several tasks is never exact.
 ///
 /// # Errors
 /// The errors of [`Grid::build_with`](crate::Grid::build_with), except those of the index region.

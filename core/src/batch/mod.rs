@@ -42,7 +42,7 @@ pub enum Coherence {
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
     /// ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64. The best
-    /// order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of 4 x 4 pixels.
+    /// order takes tile after tile of 8 x 8 pixels, and within a tile one square of 4 x 4 pixels after the other.
     Coherent = 1,
 }
 

@@ -6,8 +6,8 @@
 //! for one in 2048 triangles. The root of the tree comes first, also without a thin child: rays often start at the
 //! outer walls. A query may use either set: both hold all triangles.
 //!
-//! Quality `fast` gives fine sides to nodes above the roots of subtrees, nearest to the root of the tree first; quality
-//! `high` to nodes above the ranges of tasks.
+//! Quality `fast` gives fine sides to nodes above the roots of subtrees, nearest to the root of the tree first. Quality
+//! `high` gives them to the top nodes, which are made before the triangles are divided among tasks.
 //!
 //! ```text
 //! bvh: | ids | nodes | fine sides: 6 x 8 x f32 and the number of the node, for each node that has them |

@@ -8,7 +8,8 @@
 //!     from a level on, in the place of both: choose the part with the most items, cut it in the middle
 //! ```
 //!
-//! An item is a triangle in a tree of quality `high`, the root of a subtree in one of quality `fast`.
+//! A part is a range of items; it has nothing to do with the parts of a joined mesh. An item is a triangle in a tree of
+//! quality `high`, the root of a subtree in one of quality `fast`.
 
 use core::ops::Range;
 

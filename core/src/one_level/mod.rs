@@ -1,7 +1,7 @@
 //! The one-level hashed grid (Lagae and Dutré 2008; the paper's baseline).
 //!
-//! A grid with an index per cell and an index per reference, minus the empty cells: one bit tells
-//! whether a cell has triangles, and only then is the cell looked up.
+//! A compact grid keeps for each cell the place where its list starts, and the ids of all lists one after the other.
+//! Here each cell has one bit, which tells whether the cell has triangles. Only the full cells have a place in a table.
 //!
 //! ```text
 //! cell (x, y, z)      row  = y + resolution.y * z
