@@ -129,7 +129,9 @@ fn the_first_of_the_instances_at_one_place_is_hit() {
         let mut found = vec![SceneHit::MISS; rays.len()];
         let answers = &mut StridedMut::new(&mut found);
         let options = &mut SceneOptions::default();
-        scene.intersect_n(&Strided::new(&wide), answers, Coherence::Coherent, options).unwrap();
+        scene
+            .intersect_n_with(&Strided::new(&wide), answers, Coherence::Coherent, options)
+            .unwrap();
         for ((ray, wide), found) in rays.iter().zip(&wide).zip(&found) {
             let alone = scene.intersect(wide).unwrap_or(SceneHit::MISS);
             assert_eq!(*found, alone, "{ray:?}");

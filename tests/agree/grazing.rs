@@ -91,7 +91,7 @@ pub(crate) fn compare(instances: &[Instance], objects: &[Object<'_>], rays: &[Ra
     let mut found = vec![SceneHit::MISS; rays.len()];
     let (given, answers) = (Strided::new(rays), &mut StridedMut::new(&mut found));
     let options = &mut SceneOptions::default();
-    scene.intersect_n(&given, answers, Coherence::Coherent, options).unwrap();
+    scene.intersect_n_with(&given, answers, Coherence::Coherent, options).unwrap();
     for ((ray, found), expected) in rays.iter().zip(&found).zip(&expected) {
         assert_eq!(*found, expected.unwrap_or(SceneHit::MISS), "{ray:?} {instances:?}");
     }

@@ -144,7 +144,9 @@ fn interleaved_rays_agree_in_scenes() {
         let mut found = vec![SceneHit::MISS; rays.len()];
         let answers = &mut StridedMut::new(&mut found);
         let options = &mut SceneOptions::default();
-        scene.intersect_n(&Strided::new(&rays), answers, Coherence::Coherent, options).unwrap();
+        scene
+            .intersect_n_with(&Strided::new(&rays), answers, Coherence::Coherent, options)
+            .unwrap();
         let mut named = [0; 3];
         for (ray, found) in rays.iter().zip(&found) {
             let alone = scene.intersect(ray).unwrap_or(SceneHit::MISS);

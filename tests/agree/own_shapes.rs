@@ -159,11 +159,11 @@ fn boxes_at_any_stride_give_the_same_answers() {
                 let (given, mut hits) = (Strided::new(&rays), vec![Hit::MISS; rays.len()]);
                 let options = &mut QueryOptions::default();
                 let answers = &mut StridedMut::new(&mut hits);
-                shapes.intersect_n(&given, answers, coherence, options, &mut test).unwrap();
+                shapes.intersect_n_with(&given, answers, coherence, options, &mut test).unwrap();
                 assert_eq!(hits, expected, "{count} at {stride}");
                 let mut occluded = vec![7_u8; rays.len()];
                 let answers = &mut StridedMut::new(&mut occluded);
-                shapes.occluded_n(&given, answers, coherence, options, &mut test).unwrap();
+                shapes.occluded_n_with(&given, answers, coherence, options, &mut test).unwrap();
                 assert_eq!(occluded, blocked, "{count} at {stride}");
             }
             let first = first_asked.get_or_insert_with(|| asked.clone());
@@ -210,7 +210,7 @@ fn hits_behind_the_origin_are_found_however_far_from_zero() {
             let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
             let options = &mut QueryOptions::default();
             let coherence = Coherence::Coherent;
-            shapes.intersect_n(&rays, answers, coherence, options, &mut test).unwrap();
+            shapes.intersect_n_with(&rays, answers, coherence, options, &mut test).unwrap();
             assert_eq!(hits, [hit.unwrap(); 9], "{ray:?} {boxes:?}");
         }
     }
@@ -254,11 +254,11 @@ fn batches_answer_as_each_ray_alone() {
                         &mut QueryOptions { mask, skip, scratch, ..QueryOptions::default() };
                     let (given, mut hits) = (Strided::new(&rays), vec![Hit::MISS; rays.len()]);
                     let answers = &mut StridedMut::new(&mut hits);
-                    shapes.intersect_n(&given, answers, coherence, options, test).unwrap();
+                    shapes.intersect_n_with(&given, answers, coherence, options, test).unwrap();
                     assert_eq!(hits, expected);
                     let mut occluded = vec![7_u8; rays.len()];
                     let answers = &mut StridedMut::new(&mut occluded);
-                    shapes.occluded_n(&given, answers, coherence, options, test).unwrap();
+                    shapes.occluded_n_with(&given, answers, coherence, options, test).unwrap();
                     assert_eq!(occluded, blocked);
                 }
             }
@@ -272,12 +272,12 @@ fn batches_answer_as_each_ray_alone() {
         let mut hits = vec![Hit::MISS; rays.len()];
         let (given, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
         let options = &mut QueryOptions::counting(&mut together);
-        shapes.intersect_n(&given, answers, Coherence::Coherent, options, test).unwrap();
+        shapes.intersect_n_with(&given, answers, Coherence::Coherent, options, test).unwrap();
         assert_eq!(together, alone);
         let mut three = [0_u8; 3];
         let answers = &mut StridedMut::new(&mut three);
         let options = &mut QueryOptions::default();
-        let refused = shapes.occluded_n(&given, answers, Coherence::Coherent, options, test);
+        let refused = shapes.occluded_n_with(&given, answers, Coherence::Coherent, options, test);
         assert_eq!(refused, Err(Error::InvalidBatch(BatchField::Answers)));
     }
 }
@@ -336,18 +336,18 @@ fn shapes_are_tested_once_for_each_ray() {
             let scratch = &mut memory[..lent];
             let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
             let answers = &mut StridedMut::new(&mut hits);
-            shapes.intersect_n(&given, answers, coherence, options, &mut { test }).unwrap();
+            shapes.intersect_n_with(&given, answers, coherence, options, &mut { test }).unwrap();
             finish(500, "intersect_n");
             let answers = &mut StridedMut::new(&mut occluded);
-            shapes.occluded_n(&given, answers, coherence, options, &mut { test }).unwrap();
+            shapes.occluded_n_with(&given, answers, coherence, options, &mut { test }).unwrap();
             finish(300, "occluded_n");
             let scratch = &mut memory[..lent];
             let options = &mut SceneOptions { scratch, ..SceneOptions::default() };
             let answers = &mut StridedMut::new(&mut found);
-            scene.intersect_n(&wide_given, answers, coherence, options).unwrap();
+            scene.intersect_n_with(&wide_given, answers, coherence, options).unwrap();
             finish(500, "intersect_n in a scene");
             let answers = &mut StridedMut::new(&mut occluded);
-            scene.occluded_n(&wide_given, answers, coherence, options).unwrap();
+            scene.occluded_n_with(&wide_given, answers, coherence, options).unwrap();
             finish(300, "occluded_n in a scene");
         }
     }

@@ -71,14 +71,14 @@ fn compare(scene: &Scene<'_>, rays: &[RayF64]) -> usize {
                         &mut SceneOptions { mask, cull, scratch, ..SceneOptions::default() };
                     let (given, mut found) = (Strided::new(rays), vec![SceneHit::MISS; rays.len()]);
                     let answers = &mut StridedMut::new(&mut found);
-                    scene.intersect_n(&given, answers, coherence, options).unwrap();
+                    scene.intersect_n_with(&given, answers, coherence, options).unwrap();
                     for (place, (found, expected)) in found.iter().zip(&expected).enumerate() {
                         let ray = rays[place];
                         assert_eq!(bits(found), *expected, "{level:?} {coherence:?} {ray:?}");
                     }
                     let mut occluded = vec![7_u8; rays.len()];
                     let answers = &mut StridedMut::new(&mut occluded);
-                    scene.occluded_n(&given, answers, coherence, options).unwrap();
+                    scene.occluded_n_with(&given, answers, coherence, options).unwrap();
                     assert_eq!(occluded, blocked, "{level:?} {coherence:?}");
                 }
             }
@@ -253,7 +253,7 @@ fn filters_and_counters_see_the_rays_of_a_batch_in_order() {
             let mut options = SceneOptions { filter, counters, ..SceneOptions::default() };
             let (given, mut found) = (Strided::new(&rays), vec![SceneHit::MISS; rays.len()]);
             scene
-                .intersect_n(&given, &mut StridedMut::new(&mut found), coherence, &mut options)
+                .intersect_n_with(&given, &mut StridedMut::new(&mut found), coherence, &mut options)
                 .unwrap();
             assert_eq!(found, alone);
             assert_eq!(counted, work);
@@ -276,7 +276,7 @@ fn arrays_that_do_not_fit_are_refused() {
 
         let mut ask = |rays: &Strided<'_>, count: usize| {
             let answers = &mut StridedMut::new(&mut hits[..count]);
-            scene.intersect_n(rays, answers, coherence, options)
+            scene.intersect_n_with(rays, answers, coherence, options)
         };
         let refused = |field| Err(Error::InvalidBatch(field));
         assert_eq!(ask(&Strided::new(&rays), 3), refused(BatchField::Answers));
@@ -285,10 +285,10 @@ fn arrays_that_do_not_fit_are_refused() {
         assert!(hits.iter().all(|hit| hit == &marked));
         let mut occluded = [7_u8; 5];
         let answers = &mut StridedMut::new(&mut occluded);
-        let answer = scene.occluded_n(&Strided::new(&rays), answers, coherence, options);
+        let answer = scene.occluded_n_with(&Strided::new(&rays), answers, coherence, options);
         assert_eq!((answer, occluded), (refused(BatchField::Answers), [7; 5]));
         let answers = &mut StridedMut::new(&mut occluded[..4]);
-        scene.occluded_n(&Strided::new(&rays), answers, coherence, options).unwrap();
+        scene.occluded_n_with(&Strided::new(&rays), answers, coherence, options).unwrap();
         assert_eq!(occluded, [1, 1, 1, 1, 7]);
     });
 }

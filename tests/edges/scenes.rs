@@ -114,9 +114,9 @@ fn no_hit_is_farther_than_all_numbers() {
                         let (mut hits, mut occluded) = ([SceneHit::MISS; 70], [0_u8; 70]);
                         let (to, options) =
                             (&mut StridedMut::new(&mut hits), &mut SceneOptions::default());
-                        scene.intersect_n(&rays, to, coherence, options).unwrap();
+                        scene.intersect_n_with(&rays, to, coherence, options).unwrap();
                         let to = &mut StridedMut::new(&mut occluded);
-                        scene.occluded_n(&rays, to, coherence, options).unwrap();
+                        scene.occluded_n_with(&rays, to, coherence, options).unwrap();
                         assert!(hits.iter().all(|found| *found == hit.unwrap_or(SceneHit::MISS)));
                         assert!(occluded.iter().all(|&found| found == u8::from(is_hit)));
                     }

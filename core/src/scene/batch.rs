@@ -26,11 +26,11 @@ impl Scene<'_> {
     /// let rays = [0.25, 2.0].map(|x| RayF64::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut hits = [SceneHit::MISS; 2];
     /// let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
-    /// scene.intersect_n(&rays, answers, Coherence::Coherent, &mut SceneOptions::default())?;
+    /// scene.intersect_n_with(&rays, answers, Coherence::Coherent, &mut SceneOptions::default())?;
     /// assert_eq!([hits[0].t, hits[1].t], [1.0, f32::INFINITY]);
     /// # Ok::<(), Error>(())
     /// ```
-    pub fn intersect_n(
+    pub fn intersect_n_with(
         &self,
         rays: &Strided<'_>,
         hits: &mut StridedMut<'_>,
@@ -42,7 +42,7 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// The closest hit of each ray: [`intersect_n`](Self::intersect_n), wherever rays and hits lie.
+    /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and hits lie.
     pub fn intersect_batch(
         &self,
         batch: &mut impl Batch<SceneHit, RayF64>,
@@ -56,8 +56,8 @@ impl Scene<'_> {
     /// for a hit, 0 for none. `coherence` changes the time alone. The options are for all rays.
     ///
     /// # Errors
-    /// The same as of [`intersect_n`](Self::intersect_n).
-    pub fn occluded_n(
+    /// The same as of [`intersect_n_with`](Self::intersect_n_with).
+    pub fn occluded_n_with(
         &self,
         rays: &Strided<'_>,
         occluded: &mut StridedMut<'_>,
@@ -69,7 +69,8 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// Tells for each ray whether it hits anything: [`occluded_n`](Self::occluded_n), wherever rays and answers lie.
+    /// Tells for each ray whether it hits anything: [`occluded_n_with`](Self::occluded_n_with), wherever rays and
+    /// answers lie.
     pub fn occluded_batch(
         &self,
         batch: &mut impl Batch<bool, RayF64>,

@@ -25,11 +25,11 @@ impl Shapes<'_> {
     /// // The middle of each box is in the way, whatever its shape.
     /// let mut middle = |_, _: &Ray| Some(ShapeHit { t: 2.0, u: 0.0, v: 0.0 });
     /// let options = &mut QueryOptions::default();
-    /// shapes.intersect_n(&rays, answers, Coherence::Coherent, options, &mut middle)?;
+    /// shapes.intersect_n_with(&rays, answers, Coherence::Coherent, options, &mut middle)?;
     /// assert_eq!([hits[0].t, hits[1].t], [2.0, f32::INFINITY]);
     /// # Ok::<(), Error>(())
     /// ```
-    pub fn intersect_n(
+    pub fn intersect_n_with(
         &self,
         rays: &Strided<'_>,
         hits: &mut StridedMut<'_>,
@@ -42,7 +42,7 @@ impl Shapes<'_> {
         Ok(())
     }
 
-    /// The closest hit of each ray: [`intersect_n`](Self::intersect_n), wherever rays and hits lie.
+    /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and hits lie.
     pub fn intersect_batch(
         &self,
         batch: &mut impl Batch<Hit>,
@@ -56,8 +56,8 @@ impl Shapes<'_> {
     /// For each ray a byte: 1 if any shape is hit, 0 if not. The options are for all rays.
     ///
     /// # Errors
-    /// The errors of [`intersect_n`](Self::intersect_n).
-    pub fn occluded_n(
+    /// The errors of [`intersect_n_with`](Self::intersect_n_with).
+    pub fn occluded_n_with(
         &self,
         rays: &Strided<'_>,
         occluded: &mut StridedMut<'_>,
@@ -70,7 +70,8 @@ impl Shapes<'_> {
         Ok(())
     }
 
-    /// Tells for each ray whether it hits any shape: [`occluded_n`](Self::occluded_n), wherever rays and answers lie.
+    /// Tells for each ray whether it hits any shape: [`occluded_n_with`](Self::occluded_n_with), wherever rays and
+    /// answers lie.
     pub fn occluded_batch(
         &self,
         batch: &mut impl Batch<bool>,

@@ -165,7 +165,7 @@ impl Tracer for SphereTracer<'_> {
         let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
         for (rays, hits) in rays.chunks(call.rays).zip(hits.chunks_mut(call.rays)) {
             let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *hits));
-            if self.shapes.intersect_n(rays, answers, call.coherence, options, test).is_err() {
+            if self.shapes.intersect_n_with(rays, answers, call.coherence, options, test).is_err() {
                 hits.fill(Hit::MISS);
             }
         }
@@ -181,7 +181,7 @@ impl Tracer for SphereTracer<'_> {
         let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
         for (rays, occluded) in rays.chunks(call.rays).zip(occluded.chunks_mut(call.rays)) {
             let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *occluded));
-            if self.shapes.occluded_n(rays, answers, call.coherence, options, test).is_err() {
+            if self.shapes.occluded_n_with(rays, answers, call.coherence, options, test).is_err() {
                 occluded.fill(0);
             }
         }
