@@ -2729,6 +2729,7 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * is 0; `scene` may not be NULL. `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be
  * NULL. Index and scratch are compared with view, blob and arrays of each object, `scene` with each object's view
  * alone. What an inner scene shows is not looked at, and must lie elsewhere.
+ * The call writes anywhere in as much of the index as `hgrid_scene_bound` tells, and touches none of what is behind.
  *
  * Returns `HGRID_OK` and writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index
  * holds nothing of use:

@@ -221,6 +221,25 @@ static void what_is_reported_is_enough(void)
     reports_are_enough(&config);
 }
 
+/* A large index is not touched behind what is enough for any scene. */
+static void the_rest_of_an_index_is_not_touched(void)
+{
+    const size_t large = 256 * 1024;
+    hgrid_config config = HGRID_CONFIG_INIT;
+    config.run = run_all;
+    for (config.tasks = 1; config.tasks < 4; config.tasks += 2) {
+        unsigned char *const index = (unsigned char *)guarded(large);
+        hgrid_report bound = new_report;
+        hgrid_scene made;
+        EXPECT(HGRID_OK, hgrid_scene_bound(INSTANCES, &config, &bound));
+        CHECK(bound.index_bytes < large);
+        EXPECT(HGRID_OK, hgrid_build_scene(instances, INSTANCES, objects, 2, &config, index, large, scratch,
+                                           SCRATCH_BYTES, &made, NULL));
+        CHECK(all_bytes_are(index + bound.index_bytes, large - (size_t)bound.index_bytes, 0xc7));
+        EXPECT(HGRID_OK, hgrid_validate_scene(&made, scratch, SCRATCH_BYTES));
+    }
+}
+
 int main(void)
 {
     prepare();
@@ -229,5 +248,6 @@ int main(void)
     filters_are_shown_hits_of_the_scene();
     a_refit_follows_the_instances();
     what_is_reported_is_enough();
+    the_rest_of_an_index_is_not_touched();
     return 0;
 }

@@ -13,7 +13,9 @@ use zerocopy::IntoBytes;
 
 use super::instance::{Instance, StoredInstance};
 use super::{Object, Scene, Table};
-use crate::arena::{Sizes, align_up, check_alignment, move_down, section_bytes, split, split_mut};
+use crate::arena::{
+    Sizes, align_up, check_alignment, first_mut, move_down, section_bytes, split, split_mut,
+};
 use crate::blob::{Header, corrupt};
 use crate::config::Config;
 use crate::control::Control;
@@ -155,6 +157,11 @@ impl<'a> Scene<'a> {
         let (behind, available_bytes) = (behind_bytes(count.into()), index.len() as u64);
         let needed = |tree: u64| align_up(tree).saturating_add(behind);
         let short = |tree| Error::out_of_memory(Region::Index, needed(tree), available_bytes);
+        // Pages behind the bound stay untouched, as those behind the grid of a mesh do.
+        let enough =
+            Self::bound_parallel(count, config, control.tasks).map(|sizes| sizes.index_bytes);
+        let used = index.len().min(enough.unwrap_or(usize::MAX));
+        let index = first_mut(index, used as u64, Region::Index)?;
 
         // Put boxes and instances at the end of the index, and the tree at its start.
         let space = usize::try_from(behind).ok();
