@@ -2953,7 +2953,7 @@ bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
  * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit,
  * cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing, if
  * - the hit names nothing in the scene,
- * - `object_normal` is three zeros,
+ * - `object_normal` is three zeros, or one of its numbers is not finite,
  * - `object_normal` is NULL, and the hit names no triangle, or one without area,
  * - the view is one of zeros, or another pointer is NULL.
  *

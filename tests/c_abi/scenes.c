@@ -86,6 +86,11 @@ static void scenes_show_grids_shapes_and_scenes(void)
         float normal[3], given[3] = {0, 0, 5};
         CHECK(hgrid_scene_normal(&inner, &hit, NULL, normal) && normal[2] < -0.5f);
         CHECK(hgrid_scene_normal(&inner, &hit, given, normal) && fabsf(normal[2] + 1) < 1e-6f);
+        /* Any length will do, but for none and for no number. */
+        given[2] = i % 4 == 0 ? FLT_MAX : FLT_MIN / 4;
+        CHECK(hgrid_scene_normal(&inner, &hit, given, normal) && fabsf(normal[2] + 1) < 1e-6f);
+        given[i % 3] = i % 4 == 0 ? NAN : INFINITY;
+        CHECK(!hgrid_scene_normal(&inner, &hit, given, normal) && fabsf(normal[2] + 1) < 1e-6f);
         hgrid_scene_surface at;
         CHECK(hgrid_scene_surface_at(&inner, &up, &hit, &at) && at.is_front && at.normal[2] < -0.5f);
         CHECK(fabs(at.position[2] - (up.origin[2] + (double)hit.t)) < 1e-5);

@@ -240,7 +240,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Takes a normal, of any length, from the space of the object that a hit names to the scene's; the result has
-    /// length 1. `None` if the hit names no object, or the normal is zero.
+    /// length 1. `None` if the hit names no object, or the normal is zero or not finite.
     #[must_use]
     pub fn normal_of(&self, hit: &SceneHit, normal: [f32; 3]) -> Option<[f32; 3]> {
         let normal = DVec3::from_array(normal.map(f64::from));
