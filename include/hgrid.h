@@ -2840,7 +2840,8 @@ hgrid_status hgrid_pack_scene(const struct hgrid_scene *scene,
  *
  * `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of
  * what is in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as
- * long as the scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
+ * long as the scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size. A scene without instances
+ * takes no views: then the call that asks for the size opens it, and returns `HGRID_OK`.
  *
  * With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a
  * 64th of the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what

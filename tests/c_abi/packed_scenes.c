@@ -252,6 +252,22 @@ static void lost_views_are_refused(void)
     CHECK(bytes == 7);
 }
 
+/* A scene without instances takes no views: to ask for their size opens it. */
+static void a_scene_of_nothing_takes_no_views(void)
+{
+    const hgrid_ray_f64 ray = {{0.3, 0.4, 50}, {0, 0, -1}, 0, INFINITY, 0};
+    hgrid_scene empty, view = HGRID_SCENE_INIT;
+    uint64_t bytes = 0, of_views = 7;
+    EXPECT(HGRID_OK, hgrid_build_scene(NULL, 0, objects, 3, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
+                                       SCRATCH_BYTES, &empty, NULL));
+    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack_scene(&empty, NULL, 0, &bytes));
+    void *const packed = guarded((size_t)bytes);
+    EXPECT(HGRID_OK, hgrid_pack_scene(&empty, packed, (size_t)bytes, &bytes));
+    EXPECT(HGRID_OK, hgrid_open_packed_scene(packed, (size_t)bytes, NULL, 0, NULL, 0, &of_views, &view));
+    CHECK(of_views == 0 && !hgrid_occluded_scene(&view, &ray, NULL));
+    EXPECT(HGRID_OK, hgrid_validate_scene(&view, scratch, SCRATCH_BYTES));
+}
+
 #define REFUSED(parameter, call) \
     do { \
         EXPECT(HGRID_ERROR_NULL_ARGUMENT, call); \
@@ -294,6 +310,7 @@ int main(void)
     a_packed_scene_needs_nothing_else();
     what_is_refused();
     lost_views_are_refused();
+    a_scene_of_nothing_takes_no_views();
     no_pointers();
     return 0;
 }
