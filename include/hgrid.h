@@ -2314,7 +2314,7 @@ hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
  * flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`; bytes behind it are ignored. It
  * says itself which method built it and how. The mesh is the one it was built for, of which only the counts are
  * compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. If you pass a mesh, it
- * replaces the one in the blob, masks included.
+ * replaces the one in the blob, with its masks and with what `hgrid_locate` knows of meshes that were joined.
  *
  * The call does not check the whole blob. On damaged bytes queries may answer wrongly, but they end, and
  * they read nothing outside the blob and the mesh. `hgrid_validate` proves a blob. The bytes must not

@@ -166,6 +166,11 @@ static void a_grid_of_them_is_that_of_one(int method)
     CHECK(memcmp(found.indices, all_indices, sizeof all_indices) == 0);
     CHECK(memcmp(found.positions, all_positions, sizeof all_positions) == 0);
     CHECK(memcmp(found.masks, all_masks, sizeof all_masks) == 0);
+    /* Brought by the caller, this mesh is one; the meshes that were joined are known as before. */
+    EXPECT(HGRID_OK, hgrid_open(packed, (size_t)packed_bytes, &found, &again));
+    CHECK(hgrid_locate(&again, LOW, &geometry, &number) && geometry == 0 && number == LOW);
+    EXPECT(HGRID_OK, hgrid_open(packed, (size_t)packed_bytes, &joined, &again));
+    every_triangle_is_located(&again);
 }
 
 static void vertices_may_move(void)
