@@ -1375,8 +1375,9 @@ typedef struct hgrid_scene_options {
     struct hgrid_counters *counters;
     /**
      * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
-     * `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries
-     * of one ray do not look at it.
+     * `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to: each
+     * batch compares it with every object, those of a scene inside once for each way that leads there. So lend it to
+     * batches of more rays than there are objects, and not to others. Queries of one ray do not look at it.
      */
     void *scratch;
     /**

@@ -136,8 +136,9 @@ pub struct hgrid_scene_options {
     /// `primitive_tests`.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
-    /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries
-    /// of one ray do not look at it.
+    /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to: each
+    /// batch compares it with every object, those of a scene inside once for each way that leads there. So lend it to
+    /// batches of more rays than there are objects, and not to others. Queries of one ray do not look at it.
     pub scratch: *mut c_void,
     /// Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once.
     pub scratch_bytes: usize,
