@@ -2092,7 +2092,8 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * Of the options, `mask`, `skip` and `counters` are used: `cell_steps` counts the lists or leaves that are
  * visited, `primitive_tests` the triangles in them, `grid_steps` the nodes of a tree. `options` may be
  * NULL: the defaults. The call returns false for invalid arguments: another NULL, a view of zeros, options
- * that break the rules, a point that is not finite, a distance that is NaN or negative.
+ * that break the rules, a point that is not finite, a distance that is NaN or negative. A triangle whose distance is
+ * beyond the range of `float` is not found, whatever `max_distance` is.
  *
  * The call allocates nothing and always ends. With `HGRID_METHOD_BVH` it visits the nodes that are no
  * farther than the answer, wherever the point lies. With the other methods the time grows with the

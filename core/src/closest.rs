@@ -155,7 +155,7 @@ impl Grid<'_> {
     ///
     /// Of the options, only the mask, the triangle to skip and the counters apply. A cell step is a list or a leaf, a
     /// grid step a node of a tree. A point or a distance that is NaN, an infinite point and a negative distance find
-    /// nothing.
+    /// nothing. A triangle whose distance is beyond the range of f32 is not found.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]

@@ -249,6 +249,12 @@ static void queries(void)
            hgrid_closest_point(&grid, &query, &options, NULL));
     CHECK(hgrid_closest_point(&grid, &query, NULL, &out.closest));
     puts("null hgrid_closest_point.options");
+    /* A distance that no float holds is not found. */
+    hgrid_point_query far_away = query;
+    far_away.max_distance = INFINITY, far_away.point[0] = FLT_MAX;
+    CHECK(hgrid_closest_point(&grid, &far_away, NULL, &out.closest));
+    far_away.point[1] = FLT_MAX;
+    CHECK(!hgrid_closest_point(&grid, &far_away, NULL, &out.closest));
 
     const hgrid_hit hit = {1, 0.25f, 0.25f, 3};
     MISSED(hgrid_surface_at.grid, hgrid_surface_at(NULL, rays, &hit, &out.surface));
