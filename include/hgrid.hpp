@@ -2060,7 +2060,7 @@ public:
         const status answer = pack(*packed);
         return answer == status::ok ? std::move(packed) : answer;
     }
-    /// Bytes that the views of a packed scene take; 0 for another blob.
+    /// Bytes that the views of a packed scene take; 0 for another blob, and for a scene without instances.
     static std::uint64_t view_bytes(span<const byte> blob) noexcept
     {
         std::uint64_t bytes = 0;
