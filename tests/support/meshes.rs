@@ -92,7 +92,12 @@ pub fn ball(cells: u32, roundness: f32) -> Mesh {
 /// Returns a small ball of many triangles above a floor and between two walls, which are flat: nodes of a tree over them
 /// have fine sides.
 pub fn room() -> Mesh {
-    let mut mesh = ball(24, 1.0).scaled(0.02);
+    room_with(24)
+}
+
+/// Returns the same with a ball of `12 * cells * cells` triangles, beside 864 of the floor and the walls.
+pub fn room_with(cells: u32) -> Mesh {
+    let mut mesh = ball(cells, 1.0).scaled(0.02);
     let at = |i: u32| i as f32 / 6.0 - 1.0;
     for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
         for [a, b] in [[0, 1], [1, 2], [2, 0]] {
