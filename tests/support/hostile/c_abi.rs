@@ -20,14 +20,58 @@ const MOST_BYTES: u64 = 1 << 20;
 
 /// Runs the target; see the head of this file. Returns true if the last grid of the calls was queried.
 pub fn run(data: &[u8]) -> bool {
+    reach(data).is_settled
+}
+
+/// Runs the target, and returns how far its calls got.
+pub fn reach(data: &[u8]) -> Reached {
     let mut u = Unstructured::new(data);
-    let Ok(shape) = Shape::new(&mut u) else { return false };
-    let mut caller =
-        Caller { shape: &shape, grid: hgrid_grid::NONE, opened: None, memory: Vec::new() };
+    let Ok(shape) = Shape::new(&mut u) else { return Reached::default() };
+    let mut caller = Caller {
+        shape: &shape,
+        grid: hgrid_grid::NONE,
+        opened: None,
+        memory: Vec::new(),
+        reached: Reached::default(),
+    };
     let _ = caller.calls(&mut u);
     // This comes last, so that bytes kept before it was added keep their meaning.
     let _ = caller.join(&mut u);
-    caller.settle()
+    Reached { is_settled: caller.settle(), ..caller.reached }
+}
+
+/// The numbers of calls that succeeded. Those of empty meshes do not count.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reached {
+    /// Grids that were built.
+    pub built: usize,
+    /// Grids that the library allocated.
+    pub created: usize,
+    /// Blobs that were opened, damaged or not.
+    pub opened: usize,
+    /// Blobs that were packed.
+    pub packed: usize,
+    /// Grids of several meshes.
+    pub joined: usize,
+    /// Queries of one ray that a grid answered.
+    pub asked: usize,
+    /// Batches that a grid answered.
+    pub batches: usize,
+    /// True if the last grid was queried.
+    pub is_settled: bool,
+}
+
+impl Reached {
+    /// Adds the numbers of another program.
+    pub fn add(&mut self, other: &Self) {
+        self.built += other.built;
+        self.created += other.created;
+        self.opened += other.opened;
+        self.packed += other.packed;
+        self.joined += other.joined;
+        self.asked += other.asked;
+        self.batches += other.batches;
+    }
 }
 
 /// A view that no call has written.
@@ -48,6 +92,7 @@ pub(super) struct Caller<'s> {
     pub(super) opened: Option<Opened>,
     /// All memory lent to the library: a view stays valid while others are built.
     pub(super) memory: Vec<Memory>,
+    pub(super) reached: Reached,
 }
 
 /// The blob and the mesh of the program's grid.
@@ -78,6 +123,23 @@ enum Call {
     Pack,
     Peek,
     Words(i32),
+}
+
+impl Call {
+    /// Returns true if the call does little without a grid.
+    const fn needs_grid(self) -> bool {
+        matches!(
+            self,
+            Self::Ask
+                | Self::Batch
+                | Self::Open
+                | Self::Validate
+                | Self::All
+                | Self::Closest
+                | Self::Pack
+                | Self::Peek
+        )
+    }
 }
 
 /// The structs of a call that asks for sizes or builds.
@@ -132,7 +194,12 @@ pub(super) fn known(status: hgrid_status) -> hgrid_status {
 impl Caller<'_> {
     fn calls(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         for _ in 0..=u.int_in_range(0..=11)? {
-            match Call::arbitrary(u)? {
+            let call = Call::arbitrary(u)?;
+            // Most programs build a grid before they ask it.
+            if call.needs_grid() && self.opened.is_none() && !rarely(u, 8)? {
+                self.build(u)?;
+            }
+            match call {
                 Call::Build => self.build(u)?,
                 Call::Ask => self.ask(u)?,
                 Call::Batch => self.batch(u)?,
@@ -326,7 +393,13 @@ impl Caller<'_> {
             is_right: true,
         });
         self.memory.push(index);
+        self.reached.built += usize::from(self.has_triangles());
         Ok(())
+    }
+
+    /// Returns true if the program has a grid that is not empty.
+    pub(super) fn has_triangles(&self) -> bool {
+        self.core().is_some_and(|grid| grid.mesh().triangle_count() > 0)
     }
 
     fn fit(&mut self, u: &mut Unstructured<'_>) -> Result<()> {

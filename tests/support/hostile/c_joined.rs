@@ -29,7 +29,7 @@ const EMPTY: hgrid_mesh = hgrid_mesh {
 
 impl Caller<'_> {
     /// Joins a few meshes and builds a grid of them, which must locate its triangles.
-    pub(super) fn join(&self, u: &mut Unstructured<'_>) -> Result<()> {
+    pub(super) fn join(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut meshes = Vec::new();
         for _ in 0..u.int_in_range(0..=4)? {
             let mut mesh = *self.mesh(u)?.value();
@@ -110,6 +110,7 @@ impl Caller<'_> {
         // SAFETY: the scratch has exactly that size.
         let status = known(unsafe { hgrid_validate(&raw const grid, proof.at(0), bytes) });
         assert_eq!(status, HGRID_OK);
+        self.reached.joined += usize::from(meshes.len() > 1 && joined.triangle_count > 0);
         Ok(())
     }
 }

@@ -88,6 +88,7 @@ impl Caller<'_> {
             let mut hit = UNTOUCHED;
             let to_hit = if rarely(u, 48)? { null_mut() } else { from_mut(&mut hit) };
             let asked = core.filter(|_| !to_hit.is_null() && options.are_sound());
+            let is_answered = asked.is_some_and(|grid| grid.mesh().triangle_count() > 0);
             let mut told = Told::default();
             let expected = asked.and_then(|grid| {
                 options.ask(&mut told, 0, |options| grid.intersect_with(&ray, options))
@@ -109,6 +110,7 @@ impl Caller<'_> {
             let is_hit = unsafe { hgrid_occluded(grid, to_ray, options.as_ptr()) };
             assert_eq!(is_hit, expected, "{ray:?}");
             assert!(options.agree(&told), "{ray:?}");
+            self.reached.asked += usize::from(is_answered);
         }
         Ok(())
     }
@@ -284,6 +286,7 @@ impl Caller<'_> {
             };
             assert!(agrees, "other filter calls or counters than core's");
         }
+        self.reached.batches += usize::from(self.has_triangles());
         Ok(())
     }
 

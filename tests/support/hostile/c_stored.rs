@@ -67,6 +67,7 @@ impl Caller<'_> {
         self.grid = grid;
         self.opened = Some(Opened { blob: self.memory.len(), from: start, mesh, is_right });
         self.memory.push(blob);
+        self.reached.opened += usize::from(self.has_triangles());
         Ok(())
     }
 
@@ -115,6 +116,7 @@ impl Caller<'_> {
         let blob = self.memory.len();
         self.opened = Some(Opened { blob, from: 0, mesh: None, is_right });
         self.memory.push(memory);
+        self.reached.packed += usize::from(self.has_triangles());
         Ok(())
     }
 
@@ -222,6 +224,7 @@ impl Caller<'_> {
             let status =
                 known(unsafe { hgrid_validate(grid, scratch.as_mut_ptr().cast(), scratch.len()) });
             assert_eq!(status, HGRID_OK, "what was created is valid");
+            self.reached.created += usize::from(input.mesh.value().triangle_count > 0);
         }
         // SAFETY: the grid was just made, or is NULL.
         unsafe { hgrid_destroy(grid) };

@@ -26,7 +26,7 @@ mod validate;
 
 pub use ask::{agrees, ends};
 pub use build_mesh::run as build_mesh;
-pub use c_abi::run as c_abi;
+pub use c_abi::{Reached, reach as c_abi_reach, run as c_abi};
 pub use damage::Edit;
 pub use open_query::run as open_query;
 pub use rays::fixed_rays;
