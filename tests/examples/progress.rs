@@ -38,7 +38,8 @@ fn a_terminal_gets_a_line_that_changes() {
     }
     let (program, _dir) = small();
     let words = [program.get_program()].into_iter().chain(program.get_args());
-    let words: Vec<_> = words.map(|word| word.to_str().expect("text")).collect();
+    // A shell reads them, and a folder's name may have a space.
+    let words: Vec<_> = words.map(|word| format!("'{}'", word.display())).collect();
     let mut script = command("script");
     let typescript = run(script.args(["-qec", &words.join(" "), "/dev/null"]));
     let said = String::from_utf8(typescript.stdout).expect("text");

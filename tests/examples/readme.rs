@@ -136,7 +136,18 @@ fn pages() -> impl Iterator<Item = String> {
 
 #[test]
 fn the_files_that_pages_name_are_there() {
-    let folders = ["core", "capi", "include", "c_examples", "tests", "lab", "docs", ".ci"];
+    let folders = [
+        "core",
+        "capi",
+        "include",
+        "c_examples",
+        "examples",
+        "tests",
+        "lab",
+        "docs",
+        "dist",
+        ".ci",
+    ];
     for name in pages() {
         let page = page(&name);
         let words = page.split(|c: char| c.is_whitespace() || "`()|:;,[]".contains(c));
