@@ -37,8 +37,9 @@ void trace(const hgrid_grid *grid)
     static hgrid_ray rays[RAYS];
     static hgrid_hit hits[RAYS];
     uint32_t found = 0, blocked = 0;
+    /* A ray that misses writes nothing, so its hit keeps this number, which no triangle has. */
     for (int i = 0; i < RAYS; i++)
-        rays[i] = camera_ray(i);
+        rays[i] = camera_ray(i), hits[i].primitive = HGRID_INVALID_ID;
 
     paint_stack();
     uint32_t before = ticks();
@@ -48,7 +49,7 @@ void trace(const hgrid_grid *grid)
 
     uint64_t sum = 0xcbf29ce484222325u;
     for (int i = 0; i < RAYS; i++)
-        if (hits[i].primitive < TRIANGLES)
+        if (hits[i].primitive != HGRID_INVALID_ID)
             sum = add(sum, &hits[i]);
 
     paint_stack();
