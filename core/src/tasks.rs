@@ -17,6 +17,7 @@ use zerocopy::{FromBytes, IntoBytes};
 
 use crate::control::Control;
 use crate::error::Error;
+#[cfg(target_has_atomic = "32")]
 use crate::invariant::OrBug;
 use crate::simd::IS_SMALL;
 
