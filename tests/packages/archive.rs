@@ -269,6 +269,31 @@ fn a_checkout_without_cargo_says_how_to_get_it() {
     assert!(!status.success() && said.contains("HGRID_PREBUILT is no unpacked"), "{said}");
 }
 
+/// The README of an archive for a microcontroller does not send its reader to this machine's compiler.
+#[test]
+fn an_archive_for_a_bare_machine_asks_for_a_cross_compiler() {
+    let tools = ["bash", "tar", "gzip"];
+    if tools.iter().any(|tool| Command::new(tool).arg("--version").output().is_err()) {
+        skip("`bash`, `tar` or `gzip` is not installed");
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let target = "thumbv6m-none-eabi";
+    let library = dir.path().join("archives").join(target).join("release");
+    fs::create_dir_all(&library).expect("a folder");
+    fs::write(library.join("libhgrid.a"), "").expect("a library");
+    let mut make = Command::new(root().join("dist/make"));
+    // `echo` builds nothing: the library is there.
+    make.arg(target).env("CARGO", "echo").env("CARGO_TARGET_DIR", dir.path());
+    let archive = output_of(make.env("HGRID_DIST", dir.path()));
+    let readme = format!("hgrid-{VERSION}-{target}/README.md");
+    let mut tar = Command::new("tar");
+    let readme = output_of(tar.args(["-xzOf", archive.trim_end(), &readme]));
+    let (before, _) = readme.split_once("cc -Iinclude").expect("a command");
+    assert!(before.contains("`cc` stands for your cross compiler"), "{readme}");
+    assert!(!readme.contains('@'), "{readme}");
+}
+
 #[test]
 #[ignore = "slow: an archive for this machine, made from nothing"]
 fn an_archive_for_an_unknown_target_is_refused() {
