@@ -369,6 +369,10 @@ static int ask(const hgrid_config *config, const char *mesh_name, const char *na
     return 0;
 }
 
+#ifndef SUMS_TINY
+#include "scene_sums.h"
+#endif
+
 int sums(void)
 {
     static const hgrid_config configs[] = {HGRID_CONFIG_INIT_BVH, HGRID_CONFIG_INIT_BVH,
@@ -399,5 +403,12 @@ int sums(void)
         if (failure)
             return 100 * (int)i + failure;
     }
+#ifndef SUMS_TINY
+    if (hgrid_has_method(HGRID_METHOD_BVH)) {
+        const int failure = ask_scenes();
+        if (failure)
+            return 1000 + failure;
+    }
+#endif
     return 0;
 }
