@@ -333,6 +333,31 @@ impl PlacedTriangle {
         Some(Self { reach, overlap, margin: lattice.margin() })
     }
 
+    /// Returns true if [`each_cell`](Self::each_cell) shows a cell. It looks at this cell alone, unless the triangle
+    /// overlaps none and this is the first of its box.
+    pub(super) fn is_in(&self, node: &GridNode, cell: [u32; 3]) -> bool {
+        let range = node.range(&self.reach);
+        range.contains(cell)
+            && (range.count() == 1
+                || self.overlaps(node, cell)
+                || cell == range.min && self.first(node) == cell)
+    }
+
+    /// The first cell that [`each_cell`](Self::each_cell) shows. It looks at no cell behind it, unless the triangle
+    /// overlaps none.
+    pub(super) fn first(&self, node: &GridNode) -> [u32; 3] {
+        let range = node.range(&self.reach);
+        range.cells().find(|&cell| self.overlaps(node, cell)).unwrap_or(range.min)
+    }
+
+    /// Returns true if the triangle overlaps a cell that its box meets.
+    fn overlaps(&self, node: &GridNode, cell: [u32; 3]) -> bool {
+        let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
+        let size = 1.0 / scale;
+        let center = origin + (Vec3A::from_array(cell.map(as_f32)) + 0.5) * size;
+        self.overlap.with(center, size * 0.5 + self.margin)
+    }
+
     /// Shows `visit` the cells of a grid that the triangle overlaps, with their
     /// numbers: one at least, so that a triangle which only touches a cell is not lost
     /// in the grid that the cell holds. Returns how many cells it looked at.

@@ -44,7 +44,7 @@ struct ListChecks<'a> {
 /// The triangles in a grid.
 #[derive(Debug, Clone, Copy)]
 struct Contents {
-    /// Number of triangles.
+    /// Number of triangles; 0 for the root, of which nothing asks it.
     count: u32,
     /// Triangles of each of its cells, added up.
     references: u64,
@@ -166,17 +166,14 @@ impl ListChecks<'_> {
     fn count(&mut self, id: u32, depth: usize) -> bool {
         let Some(placed) = PlacedTriangle::new(self.mesh, self.lattice, id) else { return false };
         let mut is_first = true;
-        for (place, contents) in self.places.iter().zip(&mut self.contents).take(depth + 1).rev() {
+        let grids = self.places.iter().zip(&mut self.contents).take(depth + 1);
+        for (level, (place, contents)) in grids.enumerate().rev() {
             let Some((node, cell)) = place else { return false };
-            let (mut first, mut is_there) = (None, false);
-            placed.each_cell(node, |_, other| {
-                first.get_or_insert(other);
-                is_there |= other == *cell;
-            });
-            if !is_there {
+            if !placed.is_in(node, *cell) {
                 return false;
             }
-            is_first &= first == Some(*cell);
+            // Nothing asks how many triangles are in the root, where the first cell may be far from the others.
+            is_first = is_first && level > 0 && placed.first(node) == *cell;
             contents.count += u32::from(is_first);
             contents.reach = contents.reach.union(&placed.reach);
         }
@@ -272,11 +269,35 @@ impl ListChecks<'_> {
 
 /// Returns true if these cells are the first of their grids that a triangle overlaps.
 fn is_first(placed: &PlacedTriangle, places: &[Option<CellOfGrid>]) -> bool {
-    places.iter().flatten().all(|(node, cell)| {
-        let mut first = None;
-        placed.each_cell(node, |_, cell| {
-            first.get_or_insert(cell);
-        });
-        first == Some(*cell)
-    })
+    places.iter().flatten().all(|(node, cell)| placed.first(node) == *cell)
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::random;
+
+    #[test]
+    fn single_cells_are_those_that_the_build_fills() {
+        let mut state = 1;
+        let bounds = Aabb { min: glam::Vec3A::splat(-1.5), max: glam::Vec3A::splat(1.5) };
+        let lattice = Lattice::new(bounds, [7, 5, 6]);
+        let node = GridNode::root(lattice.resolution);
+        for _ in 0..if cfg!(miri) { 2 } else { 100 } {
+            let corners = [(); 3].map(|()| random::point(&mut state).to_array());
+            // A large triangle, one without area, a point.
+            let [a, b, c] = corners;
+            for positions in [[a, b, c], [a, b, b], [c, c, c]] {
+                let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]]).unwrap();
+                let placed = PlacedTriangle::new(&mesh, &lattice, 0).unwrap();
+                let mut shown = Vec::new();
+                placed.each_cell(&node, |_, cell| shown.push(cell));
+                assert_eq!(placed.first(&node), shown[0]);
+                let all = CellRange::all(lattice.resolution).cells();
+                assert!(all.filter(|&cell| placed.is_in(&node, cell)).eq(shown));
+            }
+        }
+    }
 }
