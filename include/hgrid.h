@@ -649,9 +649,10 @@ typedef struct hgrid_config {
      * to continue or false to cancel. May be NULL. It is called on the thread that builds, a few times to
      * a few hundred times. `done` grows from call to call; the last call of a build that succeeds gets
      * `HGRID_PROGRESS_END`, and its result is ignored. After false the build ends with
-     * `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. The callback may query
-     * and build other grids. It must not touch the regions of this build, change its mesh, or be left by
-     * `longjmp` or by a C++ exception.
+     * `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. Calls are not spread
+     * evenly: during the longest step of a tree or of a variable grid, which may take most of the time of a
+     * build, there is none. The callback may query and build other grids. It must not touch the regions of
+     * this build, change its mesh, or be left by `longjmp` or by a C++ exception.
      */
     bool (*progress)(void *context, uint32_t done);
 } hgrid_config;
