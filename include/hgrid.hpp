@@ -617,9 +617,12 @@ span<const byte> as_bytes(const C &container) noexcept
 template <class C, std::enable_if_t<!detail::stays<C &&>::value, int> = 0>
 span<const byte> as_bytes(C &&) = delete;
 
-/// The bytes of elements, to be written: an array becomes a region.
-template <class C>
-span<byte> as_writable_bytes(C &container) noexcept
+/// The bytes of elements, to be written: an array becomes a region. The elements are not const, and have a name.
+template <class C,
+          std::enable_if_t<detail::stays<C &&>::value &&
+                               !std::is_const<detail::element_of<std::remove_reference_t<C>>>::value,
+                           int> = 0>
+span<byte> as_writable_bytes(C &&container) noexcept
 {
     return {reinterpret_cast<byte *>(detail::data_of(container)),
             detail::size_of(container) * sizeof(*detail::data_of(container))};

@@ -177,7 +177,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 76] = [
+const REFUSED: [(&str, &str); 78] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     (
@@ -274,6 +274,8 @@ const REFUSED: [(&str, &str); 76] = [
     ("auto v = hgrid::view::open(hgrid::as_bytes(std::vector<int>(16)));", "delete"),
     ("hgrid::view v = made<const hgrid::grid>();", "delete"),
     ("hgrid::span<float> s = std::array<float, 9>();", "conver"),
+    ("hgrid::as_writable_bytes(std::vector<float>(9));", "as_writable_bytes"),
+    ("const std::vector<float> v(9); hgrid::as_writable_bytes(v);", "as_writable_bytes"),
     (
         "hgrid::view::build(hgrid::mesh(vertices, indices), {}, made<hgrid::memory>(), {});",
         "conver",
@@ -315,7 +317,7 @@ const REFUSED: [(&str, &str); 76] = [
 
 /// Lines like those of [`REFUSED`] that compile: what is referred to has a name, or is a span of what has one, or is
 /// read during the call alone.
-const ACCEPTED: [&str; 19] = [
+const ACCEPTED: [&str; 20] = [
     "hgrid::mesh m{hgrid::span<const float>(vertices), hgrid::span<const unsigned>(indices)}; m.masks(indices);",
     "hgrid::mesh m(vertices, indices); m.masks(hgrid::span<const unsigned>(indices));",
     "std::vector<hgrid::part> parts(1); static_cast<void>(hgrid::mesh::join(std::vector<hgrid::mesh>(), parts));",
@@ -343,6 +345,8 @@ const ACCEPTED: [&str; 19] = [
      static_cast<void>(hgrid::scene::open_packed(hgrid::span<const hgrid::byte>(m), m, hgrid::span<hgrid::byte>(m)));",
     "static_cast<void>(hgrid::peek(made<hgrid::memory>()));\
      static_cast<void>(hgrid::scene::view_bytes(made<hgrid::memory>()));",
+    "std::vector<float> v(9); static_cast<void>(hgrid::as_bytes(hgrid::span<const float>(v)));\
+     static_cast<void>(hgrid::as_writable_bytes(hgrid::span<float>(v)));",
     "hgrid::view v; v = {}; hgrid::grid g; v = g; v = made<const hgrid::grid &>(); v = hgrid::view();",
     "const auto said = hgrid::verdict::accept; hgrid::options options;\
      auto f = [&](const hgrid::hit &) -> const hgrid::verdict & { return said; }; options.filter(f);",
