@@ -1898,7 +1898,7 @@ public:
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<shapes> open(Blob &&, const boxes &) = delete;
     /// Gives the tree in a blob the boxes of shapes that moved, in place, as `view::refit` does.
-    static result<shapes> refit(span<byte> blob, const boxes &of, refit_report *details = nullptr) noexcept
+    static result<shapes> refit(const boxes &of, span<byte> blob, refit_report *details = nullptr) noexcept
     {
         shapes moved;
         const status answer = detail::said(

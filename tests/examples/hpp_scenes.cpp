@@ -185,7 +185,7 @@ void check_objects_that_move()
     height = -2;
     box[0][2] = -2.1f, box[0][5] = -1.9f;
     views[0] = *hgrid::view::refit(hgrid::mesh(lower, indices), *view_index);
-    trees[0] = *hgrid::shapes::refit(*tree_index, hgrid::boxes(box, test));
+    trees[0] = *hgrid::shapes::refit(hgrid::boxes(box, test), *tree_index);
     scenes[0] = *hgrid::scene::refit(both, inside, *inner_index);
     *outer = *hgrid::scene::refit(all, outside, *outer_index);
     CHECK(is_near(outer->intersect(on_view)->t, 3) && is_near(outer->intersect(on_tree)->t, 3));
@@ -220,7 +220,7 @@ void check_masks_of_shapes()
         boxes.masks(masks);
         CHECK(hgrid::shapes::build(boxes, {}, index, room).error() == hgrid::status::invalid_masks);
         CHECK(hgrid::shapes::open(index, boxes).error() == hgrid::status::invalid_masks);
-        CHECK(hgrid::shapes::refit(index, boxes).error() == hgrid::status::invalid_masks);
+        CHECK(hgrid::shapes::refit(boxes, index).error() == hgrid::status::invalid_masks);
         hgrid_shapes raw = HGRID_SHAPES_INIT;
         CHECK(hgrid_open_shapes(index.data(), index.size(), &boxes.c(), &raw) == HGRID_ERROR_INVALID_MASKS);
         if (masks.empty())
@@ -339,7 +339,7 @@ void check_scenes()
     instances[1].translation[2] = -7;
     const auto moved = hgrid::scene::refit(instances, objects, hgrid::as_writable_bytes(scene_index));
     CHECK(moved && moved->intersect(left)->t == 8);
-    CHECK(hgrid::shapes::refit(hgrid::as_writable_bytes(shape_index), boxes));
+    CHECK(hgrid::shapes::refit(boxes, hgrid::as_writable_bytes(shape_index)));
     hgrid::report enough;
     CHECK(hgrid::scene::bound(3, hgrid::config(), enough) == hgrid::status::ok);
     CHECK(enough.index_bytes <= hgrid::scene_bound(3));
