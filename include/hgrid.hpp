@@ -2031,10 +2031,12 @@ public:
     template <class Objects, std::enable_if_t<!detail::stays<Objects &&>::value, int> = 0>
     static result<scene> refit(span<const instance>, Objects &&, span<byte>, refit_report * = nullptr) = delete;
     /// Tells how much memory is enough for any scene of so many instances, with any configuration.
-    static status bound(std::size_t instances, const config &how, report &details) noexcept
+    static result<report> bound(std::size_t instances, const config &how) noexcept
     {
         const ::hgrid_config raw = how.c();
-        return detail::said(::hgrid_scene_bound(instances, &raw, &details));
+        report found;
+        const status answer = detail::said(::hgrid_scene_bound(instances, &raw, &found));
+        return answer == status::ok ? result<report>(found) : answer;
     }
     /// Proves that the blob is a scene of its objects, in scratch of `validate_bound` bytes.
     status validate(span<byte> scratch) const noexcept

@@ -340,9 +340,9 @@ void check_scenes()
     const auto moved = hgrid::scene::refit(instances, objects, hgrid::as_writable_bytes(scene_index));
     CHECK(moved && moved->intersect(left)->t == 8);
     CHECK(hgrid::shapes::refit(boxes, hgrid::as_writable_bytes(shape_index)));
-    hgrid::report enough;
-    CHECK(hgrid::scene::bound(3, hgrid::config(), enough) == hgrid::status::ok);
-    CHECK(enough.index_bytes <= hgrid::scene_bound(3));
+    const auto enough = hgrid::scene::bound(3, {});
+    CHECK(enough && enough->index_bytes <= hgrid::scene_bound(3));
+    CHECK(hgrid::scene::bound(3, hgrid::method::fixed).error() == hgrid::status::invalid_method);
     // A scene packs with all that it shows, but not with shapes, which stay with the caller.
     CHECK(moved->packed_bytes() == 0 && moved->pack().error() == hgrid::status::other_content);
     alignas(64) static unsigned char plain_index[hgrid::scene_bound(8) / 64 * 64 + 64];
