@@ -1849,6 +1849,17 @@ public:
             return (*static_cast<Test *>(context))(shape, *along, *found);
         };
     }
+    /// Boxes of another kind: they are six floats each.
+    template <class Boxes, class Test,
+              std::enable_if_t<!std::is_convertible<Boxes &&, strided<const std::array<float, 6>>>::value &&
+                                   detail::stays<Boxes &&>::value && std::is_lvalue_reference<Test>::value,
+                               int> = 0>
+    boxes(Boxes &&, Test &&) noexcept
+    {
+        static_assert(!std::is_lvalue_reference<Test>::value,
+                      "a box is a std::array<float, 6>, two opposite corners; name the field of a struct that has one: "
+                      "hgrid::field(shapes, &shape::box)");
+    }
     /// Shapes refer to their boxes and to the test: give both a name.
     template <class Boxes = strided<const std::array<float, 6>>, class Test,
               std::enable_if_t<!detail::stays<Boxes &&>::value || !std::is_lvalue_reference<Test>::value, int> = 0>

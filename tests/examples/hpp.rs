@@ -177,7 +177,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 78] = [
+const REFUSED: [(&str, &str); 79] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     (
@@ -292,6 +292,7 @@ const REFUSED: [(&str, &str); 78] = [
     ("std::vector<box> v(1); hgrid::boxes b(v, accepts());", "delete"),
     ("std::vector<box> v(1); hgrid::boxes b(v, made<const accepts>());", "delete"),
     ("std::vector<box> v(1); hgrid::boxes(v, meets).masks(std::vector<unsigned>(1));", "delete"),
+    ("std::vector<quad> v(1); hgrid::boxes b(v, meets);", "name the field of a struct"),
     ("std::vector<box> v(1); hgrid::boxes b(v, refused);", "put the function into a lambda"),
     (
         "std::vector<box> v(1); auto f = [](int) { return true; }; hgrid::boxes b(v, f);",
