@@ -131,8 +131,27 @@ fn the_cost_tells_when_to_build_again() {
     let much = refit(copy.bytes_mut(), &scattered.view()).unwrap();
     assert_eq!(much.cost_before.to_bits(), little.cost_after.to_bits());
     assert!(much.cost_after > 3.0 * much.cost_before, "{much:?}");
+    // The cost is relative to the surface of the tree's box, which one vertex can enlarge.
+    let mut positions = scattered.positions.clone();
+    positions[0] = [1000.0; 3];
+    let spread = Mesh { positions, indices: mesh.indices.clone() };
+    let small = refit(copy.bytes_mut(), &spread.view()).unwrap();
+    assert!(small.cost_after < little.cost_before, "{small:?}");
+    assert!(
+        small.cost_after * surface(&spread) > 3.0 * little.cost_before * surface(&mesh),
+        "{small:?}"
+    );
     let back = refit(copy.bytes_mut(), &mesh.view()).unwrap();
     assert_eq!(back.cost_after.to_bits(), little.cost_before.to_bits());
+}
+
+/// Returns half the surface of the box that all vertices have.
+fn surface(mesh: &Mesh) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let all = mesh.positions.iter().map(|position| f64::from(position[axis]));
+        all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
+    });
+    x * y + y * z + z * x
 }
 
 /// Expects a refit to fail and to leave the bytes unchanged.
