@@ -7,7 +7,7 @@ use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use hgrid_tests::hostile::TARGETS;
+use hgrid_tests::hostile::{Reached, TARGETS, c_abi_reach};
 use tar::Archive;
 
 /// Returns the path of a file or folder beside this source.
@@ -57,6 +57,19 @@ fn what_fuzzing_kept_does_no_harm() {
         let grids = run_all(target.run, &inputs);
         assert!(inputs.len() > 200 && 4 * grids > inputs.len(), "{grids} of {}", inputs.len());
     }
+}
+
+/// Programs that have no bytes left after a few calls reach little, and libFuzzer likes short inputs.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn the_programs_that_fuzzing_kept_reach_every_kind_of_call() {
+    let mut sum = Reached::default();
+    for (_, program) in kept("c_abi") {
+        sum.add(&c_abi_reach(&program));
+    }
+    let Reached { built, created, opened, packed, joined, asked, batches, .. } = sum;
+    let least = [built, opened, packed, joined, asked, batches].into_iter().min();
+    assert!(created > 0 && least > Some(8), "{sum:?}");
 }
 
 #[test]
