@@ -1354,9 +1354,11 @@ typedef struct hgrid_scene_options {
      */
     uint32_t cull;
     /**
-     * 0.
+     * `filter` is called for the triangles whose mask in their mesh has a bit in common with this one. The others are
+     * opaque: their hits count without a call. With 0, the default, and with all bits it is called for every triangle,
+     * even one whose mask is 0.
      */
-    uint32_t reserved;
+    uint32_t filter_mask;
     /**
      * Yours: passed on to `filter`.
      */

@@ -1805,6 +1805,8 @@ public:
     /// The options refer to the filter: give it a name.
     template <class F>
     scene_options &filter(const F &&) = delete;
+    /// The filter is asked about triangles whose mask in their mesh has a bit in common with this one; with 0, about all.
+    scene_options &filter_mask(std::uint32_t bits) noexcept { return raw_.filter_mask = bits, *this; }
     /// The struct that C takes.
     const ::hgrid_scene_options &c() const noexcept { return raw_; }
 

@@ -336,11 +336,6 @@ impl hgrid_query_options {
             && self.counters.is_null()
     }
 
-    /// The triangles that the filter is asked about, as core knows them.
-    pub(crate) const fn filter_mask(&self) -> u32 {
-        if self.filter_mask == 0 { u32::MAX } else { self.filter_mask }
-    }
-
     /// The sides that are not hit.
     pub(crate) const fn cull(&self) -> Result<Cull, hgrid_status> {
         cull(self.cull)
@@ -355,6 +350,11 @@ pub(crate) const fn cull(cull: u32) -> Result<Cull, hgrid_status> {
         HGRID_CULL_FRONT => Ok(Cull::Front),
         _ => Err(HGRID_ERROR_INVALID_CULL),
     }
+}
+
+/// The mask of the triangles that a filter is asked about, as core knows it.
+pub(crate) const fn filter_mask(bits: u32) -> u32 {
+    if bits == 0 { u32::MAX } else { bits }
 }
 
 /// A verdict as core knows it.

@@ -120,8 +120,10 @@ pub struct hgrid_scene_options {
     /// The sides of triangles that are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own
     /// mesh: an instance that mirrors does not turn it round.
     pub cull: u32,
-    /// 0.
-    pub reserved: u32,
+    /// `filter` is called for the triangles whose mask in their mesh has a bit in common with this one. The others are
+    /// opaque: their hits count without a call. With 0, the default, and with all bits it is called for every triangle,
+    /// even one whose mask is 0.
+    pub filter_mask: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
     /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
@@ -151,7 +153,7 @@ impl hgrid_scene_options {
         struct_size: size_of::<Self>() as u32,
         mask: u32::MAX,
         cull: 0,
-        reserved: 0,
+        filter_mask: 0,
         context: null_mut(),
         filter: None,
         counters: null_mut(),

@@ -17,6 +17,7 @@ mod refit;
 mod scans;
 mod scene_batches;
 mod scene_builds;
+mod scene_filters;
 mod scene_surfaces;
 mod scenes;
 mod snapped;

@@ -1,10 +1,8 @@
 //! Scenes: every query agrees with a loop over all instances, and with the triangles moved in f64.
 
-use std::collections::HashSet;
-
 use hgrid_core::{
     BlobInfo, Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Parameters, Quality,
-    Ray, RayF64, Scene, SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
+    Ray, RayF64, Scene, SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh,
 };
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
@@ -440,82 +438,6 @@ fn rays_from_afar_hit_what_stands_in_scenes_in_scenes() {
             }
             assert!(depths[1..].iter().all(|&hits| hits > 5), "{depths:?}");
         }
-    });
-}
-
-#[test]
-fn filters_see_the_hits_of_the_scene() {
-    with_grids(|objects, _| {
-        let instances = scattered(30, 3, 3.0, 12);
-        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
-        let scene = built.open(objects).unwrap();
-        let alone = Alone::new(&instances, objects);
-        let keeps = |hit: &SceneHit, number: u32| (hit.primitive + number).is_multiple_of(3);
-        let mut random = Random(14);
-        let mut changed = 0;
-        for round in 0..300 {
-            let ray = ray(&mut random, round, 3.0);
-            let expected = alone.closest(objects, &ray, |number, scene, ray| {
-                let mut filter = |_: usize, hit: &SceneHit| {
-                    if keeps(hit, number) { Verdict::Accept } else { Verdict::Reject }
-                };
-                let filter = Some(&mut filter as &mut _);
-                scene.intersect_with(ray, &mut SceneOptions { filter, ..SceneOptions::default() })
-            });
-            let mut filter = |place: usize, hit: &SceneHit| {
-                assert_eq!(place, 0);
-                if keeps(hit, hit.path[0]) { Verdict::Accept } else { Verdict::Reject }
-            };
-            let mut options = SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
-            let hit = scene.intersect_with(&ray, &mut options);
-            assert_eq!(hit, expected);
-            assert_eq!(scene.occluded_with(&ray, &mut options), expected.is_some());
-            changed += usize::from(hit != scene.intersect(&ray));
-        }
-        assert!(changed > 10);
-    });
-}
-
-/// The way to all hits of a ray. The oracle finds them one after the other, without a filter: each query starts
-/// behind the hit of the last one. Of hits with the same `t` in an instance, it finds the one that a filter sees first.
-#[test]
-fn a_filter_that_rejects_all_hits_sees_each_once() {
-    with_grids(|objects, _| {
-        let instances = scattered(30, 3, 3.0, 12);
-        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
-        let scene = built.open(objects).unwrap();
-        let alone = Alone::new(&instances, objects);
-        let mut random = Random(15);
-        let mut most = 0;
-        for round in 0..300 {
-            let ray = ray(&mut random, round, 3.0);
-            let mut seen = Vec::new();
-            let mut filter = |_: usize, hit: &SceneHit| {
-                seen.push((hit.path[0], hit.t.to_bits(), hit.primitive));
-                Verdict::Reject
-            };
-            let mut options = SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
-            assert_eq!(scene.intersect_with(&ray, &mut options), None);
-
-            let mut expected = Vec::new();
-            alone.closest(objects, &ray, |number, scene, ray| {
-                let mut rest = *ray;
-                while let Some(hit) = scene.intersect(&rest) {
-                    expected.push((number, hit.t.to_bits(), hit.primitive));
-                    rest.t_min = hit.t.next_up();
-                }
-                None
-            });
-            most = most.max(expected.len());
-            let once: HashSet<_> = seen.iter().collect();
-            assert_eq!(once.len(), seen.len(), "{ray:?}");
-            // Stable sorts: hits with the same `t` stay in the order in which they were seen.
-            seen.sort_by_key(|&(number, t, _)| (number, t));
-            seen.dedup_by_key(|&mut (number, t, _)| (number, t));
-            expected.sort_by_key(|&(number, t, _)| (number, t));
-            assert_eq!(seen, expected, "{ray:?}");
-        }
-        assert!(most > 4, "{most}");
     });
 }
 

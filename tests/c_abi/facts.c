@@ -177,7 +177,7 @@ static void layout(void)
     OFFSET(hgrid_scene_options, struct_size);
     OFFSET(hgrid_scene_options, mask);
     OFFSET(hgrid_scene_options, cull);
-    OFFSET(hgrid_scene_options, reserved);
+    OFFSET(hgrid_scene_options, filter_mask);
     OFFSET(hgrid_scene_options, context);
     OFFSET(hgrid_scene_options, filter);
     OFFSET(hgrid_scene_options, counters);
@@ -295,7 +295,7 @@ static void defaults(void)
            x.boxes != NULL, x.box_stride, x.count, x.masks != NULL, x.mask_stride, x.test != NULL,
            x.context != NULL);
     printf("scene_options %lu %#lx %lu %lu %d %d %d %d %zu\n", (unsigned long)n.struct_size,
-           (unsigned long)n.mask, (unsigned long)n.cull, (unsigned long)n.reserved, n.context != NULL,
+           (unsigned long)n.mask, (unsigned long)n.cull, (unsigned long)n.filter_mask, n.context != NULL,
            n.filter != NULL, n.counters != NULL, n.scratch != NULL, n.scratch_bytes);
     printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu %d %zu\n", (unsigned long)m.struct_size,
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,

@@ -123,7 +123,9 @@ static void zero_options(void)
 
 static void set_reserved(void)
 {
-    options.reserved = options_in_scene.reserved = 1;
+    options.reserved = 1;
+    /* These have no such field. */
+    options_in_scene.struct_size--;
 }
 
 static void set_unknown_cull(void)

@@ -298,9 +298,7 @@ static void what_batches_refuse(void)
     b = good_batch(), b.options = &options;
     options.struct_size--;
     no_batch(HGRID_ERROR_STRUCT_SIZE, b);
-    options.struct_size++, options.reserved = 1;
-    no_batch(HGRID_ERROR_STRUCT_SIZE, b);
-    options.reserved = 0, options.cull = 3;
+    options.struct_size++, options.cull = 3;
     no_batch(HGRID_ERROR_INVALID_CULL, b);
     options.cull = HGRID_CULL_NONE;
 

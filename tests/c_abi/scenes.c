@@ -158,6 +158,49 @@ static void filters_are_shown_hits_of_the_scene(void)
     CHECK(hits > 10 && shown > 2 * hits / 2);
 }
 
+static hgrid_verdict reject(void *context, const hgrid_scene_hit *hit)
+{
+    (void)hit;
+    ++*(unsigned *)context;
+    return HGRID_REJECT;
+}
+
+static void a_filter_is_asked_about_the_bits_of_its_mask(void)
+{
+    static uint32_t masks[TRIANGLES];
+    const uint32_t asked_about[] = {0, UINT32_MAX, 2, 4};
+    hgrid_mesh masked = mesh;
+    hgrid_scene view;
+    hgrid_object object;
+    const hgrid_instance one = HGRID_INSTANCE_INIT;
+    for (uint32_t i = 0; i < TRIANGLES; i++)
+        masks[i] = i % 2 == 0 ? 2 : 1;
+    masked.masks = masks;
+    const hgrid_grid of_masked = build_exactly(&masked, NULL, NULL, NULL);
+    EXPECT(HGRID_OK, hgrid_object_grid(&of_masked, &object));
+    EXPECT(HGRID_OK, hgrid_build_scene(&one, 1, &object, 1, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
+                                       SCRATCH_BYTES, &view, NULL));
+    unsigned hits = 0;
+    for (int i = 0; i < 100; i++)
+        for (int m = 0; m < 4; m++) {
+            const hgrid_ray_f64 down = wide_ray(0.01 * i, 0.011 * i, 1);
+            hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
+            hgrid_scene_hit hit, with;
+            unsigned calls = 0;
+            options.filter = reject, options.context = &calls, options.filter_mask = asked_about[m];
+            if (!hgrid_intersect_scene(&view, &down, NULL, &hit))
+                continue;
+            const bool is_hit = hgrid_intersect_scene(&view, &down, &options, &with);
+            const bool is_asked = m < 2 || (masks[hit.primitive] & asked_about[m]) != 0;
+            CHECK((calls > 0) == is_asked);
+            /* A ray through an edge may hit the neighbour, too. */
+            CHECK(is_asked ? !is_hit || with.primitive != hit.primitive
+                           : is_hit && memcmp(&with, &hit, sizeof hit) == 0);
+            hits += !is_asked;
+        }
+    CHECK(hits > 50);
+}
+
 static void a_refit_follows_the_instances(void)
 {
     hgrid_scene view;
@@ -251,6 +294,7 @@ int main(void)
     shapes_answer_as_a_loop_over_all();
     scenes_show_grids_shapes_and_scenes();
     filters_are_shown_hits_of_the_scene();
+    a_filter_is_asked_about_the_bits_of_its_mask();
     a_refit_follows_the_instances();
     what_is_reported_is_enough();
     the_rest_of_an_index_is_not_touched();

@@ -66,7 +66,7 @@ void check_batches(const hgrid::scene &scene)
         return hit.path[0] == 1;
     };
     hgrid::scene_options asking;
-    asking.filter(second).count(work).cull(hgrid::culling::none).mask(0xffffffffu);
+    asking.filter(second).filter_mask(0xffffffffu).count(work).cull(hgrid::culling::none).mask(0xffffffffu);
     std::vector<hgrid::scene_hit> filtered(pixels.size());
     CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent, asking) == status::ok);
     CHECK(!shown.empty() && work.primitive_tests > 0);

@@ -13,7 +13,7 @@ use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::addresses::RawRegion;
 use crate::misuse::{CallersRay as _, checked};
 use crate::query_types::{
-    hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
+    self, hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
 };
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
@@ -79,7 +79,7 @@ impl Asked {
         ask: impl FnOnce(&mut QueryOptions<'_>) -> T,
     ) -> T {
         let hgrid_query_options { mask, skip, context, filter, counters, .. } = self.options;
-        let filter_mask = self.options.filter_mask();
+        let filter_mask = query_types::filter_mask(self.options.filter_mask);
         let mut work = Counters::default();
         let is_opaque = |hit: &Hit| {
             let mask = |mesh: &TriangleMesh<'_>| mesh.mask(hit.primitive);

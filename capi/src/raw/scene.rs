@@ -23,14 +23,14 @@ use crate::addresses::{Addresses, RawRegion};
 use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
 use crate::misuse::{CallersRay as _, checked};
-use crate::query_types::{hgrid_counters, verdict};
+use crate::query_types::{self, hgrid_counters, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };
 use crate::status::{
     HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_MISALIGNED, HGRID_ERROR_NOT_A_GRID,
     HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OTHER_CONTENT, HGRID_ERROR_OVERLAP,
-    HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
+    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_report};
 
@@ -410,9 +410,6 @@ impl SceneAsked {
             // SAFETY: the caller's promise.
             unsafe { read_sized(asked) }?
         };
-        if options.reserved != 0 {
-            return Err(HGRID_ERROR_STRUCT_SIZE);
-        }
         Ok(Self { options, cull: options.cull()? })
     }
 
@@ -421,7 +418,7 @@ impl SceneAsked {
     /// # Safety
     /// The caller's promise.
     unsafe fn ask<T>(&self, ask: impl FnOnce(&mut SceneOptions<'_>) -> T) -> T {
-        let hgrid_scene_options { mask, context, filter, counters, .. } = self.options;
+        let hgrid_scene_options { mask, filter_mask, context, filter, counters, .. } = self.options;
         let mut offer = |_: usize, hit: &SceneHit| {
             let hit = hgrid_scene_hit::from(*hit);
             let Some(filter) = filter else { return Verdict::Accept };
@@ -432,6 +429,7 @@ impl SceneAsked {
         let mut options = SceneOptions { mask, cull: self.cull, ..SceneOptions::default() };
         if filter.is_some() {
             options.filter = Some(&mut offer);
+            options.filter_mask = query_types::filter_mask(filter_mask);
         }
         if !counters.is_null() {
             options.counters = Some(&mut work);

@@ -96,6 +96,10 @@ pub struct SceneOptions<'q> {
     /// another instance. What lies behind a hit that it accepted is not shown to it. [`Verdict::AcceptAndStop`] is
     /// the same as [`Verdict::Accept`]. Shapes are not shown to it: their test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
+    /// The filter is asked about a triangle if a bit of this is set in the mask that the triangle has in its mesh, too.
+    /// The others are opaque: their hits count without a call. The default is all bits: the filter is asked about every
+    /// triangle, even one whose mask is 0.
+    pub filter_mask: u32,
     /// Counters that add up the work: an instance that is offered is a primitive test. With counters or a filter, the
     /// rays of a batch are traced one by one.
     pub counters: Option<&'q mut Counters>,
@@ -105,7 +109,14 @@ pub struct SceneOptions<'q> {
 
 impl Default for SceneOptions<'_> {
     fn default() -> Self {
-        Self { mask: u32::MAX, cull: Cull::None, filter: None, counters: None, scratch: &mut [] }
+        Self {
+            mask: u32::MAX,
+            cull: Cull::None,
+            filter: None,
+            filter_mask: u32::MAX,
+            counters: None,
+            scratch: &mut [],
+        }
     }
 }
 
@@ -115,6 +126,7 @@ impl fmt::Debug for SceneOptions<'_> {
             .field("mask", &self.mask)
             .field("cull", &self.cull)
             .field("filter", &self.filter.is_some())
+            .field("filter_mask", &self.filter_mask)
             .field("counters", &self.counters)
             .field("scratch", &self.scratch.len())
             .finish()
@@ -263,17 +275,20 @@ impl Scene<'_> {
 pub(super) struct QueryParameters {
     mask: u32,
     cull: Cull,
+    filter_mask: u32,
     pub(super) is_any: bool,
 }
 
 impl QueryParameters {
     pub(super) const fn new(options: &SceneOptions<'_>, is_any: bool) -> Self {
-        Self { mask: options.mask, cull: options.cull, is_any }
+        let SceneOptions { mask, cull, filter_mask, .. } = *options;
+        Self { mask, cull, filter_mask, is_any }
     }
 
     /// The options of queries of objects.
     pub(super) fn options<'q>(self) -> QueryOptions<'q> {
-        QueryOptions { mask: self.mask, cull: self.cull, ..QueryOptions::default() }
+        let Self { mask, cull, filter_mask, .. } = self;
+        QueryOptions { mask, cull, filter_mask, ..QueryOptions::default() }
     }
 }
 
