@@ -28,7 +28,8 @@
  *   hgrid_refit                                fits a tree to vertices that moved
  *   hgrid_join, hgrid_locate                   several meshes in one grid; which of them was hit
  *   hgrid_build_shapes                         a tree of your own shapes
- *   hgrid_build_scene                          a scene of instances
+ *   hgrid_build_scene                          a scene of instances; hgrid_scene_locate and
+ *                                              hgrid_scene_instance tell which was hit
  *   hgrid_open, hgrid_peek, hgrid_validate,    stored grids; with the mesh in one file: hgrid_pack and
  *   hgrid_pack, hgrid_mesh_of                  hgrid_mesh_of; scenes with all they show: hgrid_pack_scene
  *   hgrid_inspect                              statistics of a grid
@@ -2915,6 +2916,20 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         const struct hgrid_scene_hit *hit,
                         struct hgrid_instance *instance,
                         struct hgrid_grid *grid);
+
+/**
+ * Tells an instance on the path of a hit: what `hgrid_scene_locate` tells of the innermost one.
+ *
+ * `level` 0 is the instance in `scene` itself, 1 that in the scene which this one shows, and so on: the number of the
+ * instance is `path[level]` of the hit. Returns true and writes `instance`; or returns false and writes nothing: a
+ * pointer is NULL, the view is one of zeros, the hit names nothing in the scene, or its path has no such level.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ */
+bool hgrid_scene_instance(const struct hgrid_scene *scene,
+                          const struct hgrid_scene_hit *hit,
+                          uint32_t level,
+                          struct hgrid_instance *instance);
 
 /**
  * Tells where a ray met a triangle of a scene, which way the triangle faces there, and where rays start that leave it.

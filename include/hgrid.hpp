@@ -2169,6 +2169,13 @@ public:
         static_cast<void>(::hgrid_scene_normal(&raw_, &of, object_normal.data(), found.data()));
         return found;
     }
+    /// The instance at a level of the path of a hit, 0 the outermost. Nothing if the path has no such level, or the hit
+    /// names nothing.
+    optional<instance> instance_at(const scene_hit &of, std::uint32_t level) const noexcept
+    {
+        instance found(HGRID_INVALID_ID);
+        return ::hgrid_scene_instance(&raw_, &of, level, &found) ? optional<instance>(found) : optional<instance>();
+    }
     /// The innermost instance that a hit names; one of no object if it names none.
     instance instance_of(const scene_hit &of) const noexcept
     {

@@ -34,6 +34,8 @@ mod shapes;
 
 mod scene;
 
+mod scene_path;
+
 mod scene_surface;
 
 mod scene_batch;
@@ -69,6 +71,7 @@ pub use crate::query::*;
 pub use crate::query_types::*;
 pub use crate::scene::*;
 pub use crate::scene_batch::*;
+pub use crate::scene_path::*;
 pub use crate::scene_surface::*;
 pub use crate::shapes::*;
 pub use crate::status::*;

@@ -572,27 +572,3 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
     // SAFETY: the caller's promise.
     matches!(unsafe { raw::query_scene(scene, ray, options, true) }, Ok(Some(_)))
 }
-
-/// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
-/// that it shows.
-///
-/// `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
-/// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
-/// `grid` may be NULL. Returns true and has written those that are not NULL; or returns false and has written nothing:
-/// `scene` or `hit` is NULL, or the hit names nothing in the scene.
-///
-/// Threads: any number of calls and queries on the same scene at once.
-///
-/// # Safety
-/// Pointers are as the head of this file says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_scene_locate(
-    scene: *const hgrid_scene,
-    hit: *const hgrid_scene_hit,
-    instance: *mut hgrid_instance,
-    grid: *mut hgrid_grid,
-) -> bool {
-    let to = (NonNull::new(instance), NonNull::new(grid));
-    // SAFETY: the caller's promise.
-    matches!(unsafe { raw::scene_locate(scene, hit, to) }, Ok(Some(())))
-}

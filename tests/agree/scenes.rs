@@ -328,6 +328,10 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
             let number = hit.path[depth - 1] as usize;
             let instances = [&outer, &middle, &inner][depth - 1];
             assert_eq!(scene.instance_of(&hit).unwrap().id, instances[number].id);
+            for (level, instances) in [&outer, &middle, &inner].into_iter().enumerate() {
+                let id = (level < depth).then(|| instances[hit.path[level] as usize].id);
+                assert_eq!(scene.instance_at(&hit, level).map(|instance| instance.id), id);
+            }
             let normal = scene.triangle_normal(&hit).unwrap();
             let length: f32 = normal.iter().map(|c| c * c).sum();
             assert!((length - 1.0).abs() < 1e-5);

@@ -31,7 +31,7 @@ static void prepare(void)
     grid = build_exactly(&mesh, NULL, NULL, NULL);
     scratch = guarded(SCRATCH_BYTES);
     EXPECT(HGRID_OK, hgrid_object_grid(&grid, &grids[0]));
-    two[0].id = 30, two[1].id = 31, three[1].id = 11, three[2].id = 12;
+    two[0].id = 30, two[1].id = 31, three[0].id = 10, three[1].id = 11, three[2].id = 12;
     two[1].translation[0] = 1.5, two[1].linear[2][2] = -1;
     EXPECT(HGRID_OK, hgrid_build_scene(two, 2, grids, 1, NULL, guarded(INDEX_BYTES), INDEX_BYTES, scratch,
                                        SCRATCH_BYTES, &inner, NULL));
@@ -88,6 +88,13 @@ static void a_packed_scene_needs_nothing_else(void)
         hgrid_mesh own = HGRID_MESH_INIT;
         CHECK(hgrid_scene_locate(&opened, &other, &instance, &found));
         CHECK(instance.id == (other.path[0] == 0 ? 30 + other.path[1] : 10 + other.path[0]));
+        /* Every instance on the way, and none behind. */
+        CHECK(hgrid_scene_instance(&opened, &other, 0, &instance) && instance.id == 10 + other.path[0]);
+        const bool is_nested = other.path[1] != HGRID_INVALID_ID;
+        CHECK(hgrid_scene_instance(&opened, &other, 1, &instance) == is_nested);
+        CHECK(instance.id == (is_nested ? 30 + other.path[1] : 10 + other.path[0]));
+        CHECK(!hgrid_scene_instance(&opened, &other, 2, &instance));
+        CHECK(!hgrid_scene_instance(&opened, &other, UINT32_MAX, &instance));
         EXPECT(HGRID_OK, hgrid_mesh_of(&found, &own));
         CHECK(own.triangle_count == TRIANGLES && (const char *)own.positions > (const char *)file);
     }
@@ -294,6 +301,13 @@ static void no_pointers(void)
     puts("null hgrid_scene_locate.instance");
     CHECK(hgrid_scene_locate(&opened, &hit, &instance, NULL));
     puts("null hgrid_scene_locate.grid");
+    CHECK(!hgrid_scene_instance(&opened, &miss, 0, &instance));
+    CHECK(!hgrid_scene_instance(NULL, &hit, 0, &instance));
+    puts("null hgrid_scene_instance.scene");
+    CHECK(!hgrid_scene_instance(&opened, NULL, 0, &instance));
+    puts("null hgrid_scene_instance.hit");
+    CHECK(!hgrid_scene_instance(&opened, &hit, 0, NULL));
+    puts("null hgrid_scene_instance.instance");
     REFUSED(hgrid_pack_scene.scene, hgrid_pack_scene(NULL, at, n, &bytes));
     REFUSED(hgrid_pack_scene.to, hgrid_pack_scene(&scene, NULL, n, &bytes));
     REFUSED(hgrid_pack_scene.bytes, hgrid_pack_scene(&scene, at, n, NULL));

@@ -356,6 +356,7 @@ void check_scenes()
     const auto whole = hgrid::scene::open_packed(*packed, *views);
     CHECK(whole && whole->intersect(left)->t == 8);
     CHECK(whole->instance_of(*found).translation[2] == -7 && whole->grid_of(*found).validate_bytes() > 0);
+    CHECK(whole->instance_at(*found, 0)->translation[2] == -7 && !whole->instance_at(*found, 1));
     CHECK(hgrid::scene::open_packed(*packed, *views, hgrid::as_writable_bytes(scratch)));
     CHECK(static_cast<hgrid::content>(hgrid::peek(*packed)->content) == hgrid::content::packed_scene);
     instances[0].object = 2;

@@ -43,7 +43,8 @@ pub(crate) use parts::{join, parts_of};
 pub(crate) use query::{batch, closest_point, locate, query, query_all, surface};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,
-    scene_batch, scene_locate, scene_normal, scene_surface, validate_scene, write_object,
+    scene_batch, scene_instance, scene_locate, scene_normal, scene_surface, validate_scene,
+    write_object,
 };
 pub(crate) use shapes::{
     build_shapes, open_shapes, query_shapes, refit_shapes, shapes, shapes_batch, validate_shapes,

@@ -542,6 +542,22 @@ pub(crate) unsafe fn scene_normal(
     Ok(scene.normal_of(&hit, normal))
 }
 
+/// The instance at a level of the path of a hit.
+///
+/// # Safety
+/// The contract of [`scene`].
+pub(crate) unsafe fn scene_instance(
+    view: *const hgrid_scene,
+    hit: *const hgrid_scene_hit,
+    level: u32,
+) -> Result<Option<Instance>, hgrid_status> {
+    // SAFETY: this function's contract.
+    let scene = unsafe { scene(view) }?;
+    // SAFETY: the caller's promise.
+    let hit: SceneHit = unsafe { read(hit) }?.into();
+    Ok(scene.instance_at(&hit, level as usize))
+}
+
 /// Writes the instance and the grid that a hit names.
 ///
 /// # Safety

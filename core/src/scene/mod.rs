@@ -232,6 +232,13 @@ impl<'a> Scene<'a> {
         self.place(hit)?.instances().next_back()?.instance()
     }
 
+    /// The instance at a level of the path of a hit: 0 is that of the outermost scene, and
+    /// [`instance_of`](Self::instance_of) gives the last one. `None` as there, and if the path has no such level.
+    #[must_use]
+    pub fn instance_at(&self, hit: &SceneHit, level: usize) -> Option<Instance> {
+        self.place(hit)?.instances().nth(level)?.instance()
+    }
+
     /// The object that a hit names: the grid or the shapes at the end of its path. `None` as for
     /// [`instance_of`](Self::instance_of).
     #[must_use]
