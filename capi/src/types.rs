@@ -242,9 +242,9 @@ pub struct hgrid_config {
     /// a few hundred times. `done` grows from call to call; the last call of a build that succeeds gets
     /// `HGRID_PROGRESS_END`, and its result is ignored. After false the build ends with
     /// `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. Calls are not spread
-    /// evenly: during the longest step of a tree or of a variable grid, which may take most of the time of a
-    /// build, there is none. The callback may query and build other grids. It must not touch the regions of
-    /// this build, change its mesh, or be left by `longjmp` or by a C++ exception.
+    /// evenly: there is none while several tasks run, or while a tree of `HGRID_QUALITY_HIGH` gets its top
+    /// nodes. Each may take most of the time of a build. The callback may query and build other grids. It
+    /// must not touch the regions of this build, change its mesh, or be left by `longjmp` or by a C++ exception.
     pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: u32) -> bool>,
 }
 

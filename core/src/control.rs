@@ -55,8 +55,8 @@ pub struct Control<'c> {
     /// 1, and its answer is ignored. After any other answer `false` the build ends with [`Error::Cancelled`], at the
     /// latest at the end of a pass over the mesh.
     ///
-    /// Calls are not spread evenly: during the longest step of a tree or of a variable grid, which may take most of
-    /// the time of a build, there is none.
+    /// Calls are not spread evenly: there is none while several tasks run, or while a tree of quality `high` gets its
+    /// top nodes. Each may take most of the time of a build.
     ///
     /// [`sizes_with`](crate::sizes_with) does not call it.
     pub progress: Option<&'c dyn Fn(f32) -> bool>,

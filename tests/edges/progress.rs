@@ -2,7 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 
-use hgrid_core::{Block, Config, Control, Error, Grid, Sizes, sizes};
+use hgrid_core::{Block, Config, Control, Error, Grid, Parameters, Quality, Sizes, sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle};
 use hgrid_tests::methods::configs;
 use hgrid_tests::owned::prove;
@@ -38,6 +38,27 @@ fn what_is_done_grows_to_exactly_one() {
             assert!(seen.is_sorted_by(|before, after| before < after), "{seen:?}");
         });
     }
+}
+
+/// Reports of a build of a tree in one task are at most a fifth of the whole apart, with quality `high` a quarter.
+#[test]
+fn what_is_done_of_a_tree_grows_in_small_steps() {
+    let mesh = ball(40, 1.0);
+    each(&mesh, |config, index, scratch| {
+        let most = match config.parameters {
+            Parameters::Bvh { quality: Quality::Fast } => 0.21,
+            Parameters::Bvh { .. } => 0.26,
+            _ => return,
+        };
+        let last = Cell::new(0.0);
+        let progress = |done: f32| {
+            assert!(done - last.replace(done) < most, "{config:?}: {done}");
+            true
+        };
+        let control = Control { progress: Some(&progress), ..Control::default() };
+        let (index, scratch) = (Block::bytes_mut(index), Block::bytes_mut(scratch));
+        Grid::build_with(mesh.view(), config, index, scratch, &control).unwrap();
+    });
 }
 
 #[test]

@@ -231,7 +231,11 @@ fn build_in(
     let bounds = Lattice::pad(&bounds);
     let (least, shift) = (least_node(&bounds), KEY_BITS - bits);
     let work = BuildInputs { mesh, bounds, least, sizes, shift };
-    let roots = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
+    let roots = if IS_SMALL || tasks == 1 {
+        work.roots(entries, &mut *spare, ids, nodes, counts, watch)?
+    } else {
+        work.roots_of_tasks(entries, &mut *spare, ids, nodes, counts, control)?
+    };
 
     // Build the tree on top of them.
     watch.at(TOP)?;
@@ -295,7 +299,7 @@ struct BuildInputs<'w> {
 }
 
 /// A task: its share of the units, and the memory for their subtrees.
-struct UnitsTask<'w> {
+struct UnitsTask<'w, F> {
     work: &'w BuildInputs<'w>,
     /// The entries of the units among all.
     range: Range<usize>,
@@ -306,6 +310,8 @@ struct UnitsTask<'w> {
     /// The number of the first of the nodes in the index.
     child: u32,
     counts: &'w mut [u32],
+    /// Is told how many entries of all are done, and says whether to go on.
+    goes_on: F,
 }
 
 /// The numbers of nodes and roots that a task made, and where its entries and nodes start.
@@ -317,12 +323,12 @@ struct Made {
     roots: u32,
 }
 
-impl Kernel for UnitsTask<'_> {
+impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
     type Output = (Made, RootRecord);
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Self::Output {
-        let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
+        let Self { work, range, entries, spare, ids, nodes, child, counts, mut goes_on } = self;
         let BuildInputs { mesh, least, sizes, shift, .. } = *work;
         let first = range.start as u32;
         let mut roots = Roots {
@@ -347,6 +353,11 @@ impl Kernel for UnitsTask<'_> {
             debug_assert!(unit.start == end, "entries between units");
             end = unit.end;
             roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
+            if !goes_on(end) {
+                // What is made is of no use.
+                end = range.end;
+                break;
+            }
         }
         debug_assert!(end == range.end, "the units of a task end elsewhere than its entries");
         let made = Made { first, child, nodes: roots.node_count, roots: roots.root_count };
@@ -355,7 +366,7 @@ impl Kernel for UnitsTask<'_> {
 }
 
 impl BuildInputs<'_> {
-    /// Makes the subtrees and their records. The `spare` of a single task may be shorter than its entries.
+    /// Makes the subtrees and their records in one task. `spare` may be shorter than the entries.
     fn roots(
         &self,
         entries: &mut [Entry],
@@ -363,17 +374,21 @@ impl BuildInputs<'_> {
         ids: &mut [u32],
         nodes: &mut [Node],
         counts: &mut [u32],
-        control: &Control<'_>,
+        watch: &Watch<'_>,
     ) -> Result<TaskTotals, Error> {
-        if !IS_SMALL && counts.len() > self.sizes.len() {
-            return self.roots_of_tasks(entries, spare, ids, nodes, counts, control);
-        }
         // The root of the tree is the first node.
-        let (range, child) = (0..entries.len(), 1);
+        let (range, child, all) = (0..entries.len(), 1, entries.len() as u32);
+        let mut result = Ok(());
+        let goes_on = |done: usize| {
+            result = watch.between(done as u32, all, [ROOTS, TOP]);
+            result.is_ok()
+        };
         // Empty `nodes` are legal: nodes are only counted then.
         let nodes = nodes.get_mut(1..).unwrap_or_default();
-        let all = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
-        let (made, last) = dispatch(SimdLevel::detect(), all);
+        let task =
+            UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts, goes_on };
+        let (made, last) = dispatch(SimdLevel::detect(), task);
+        result?;
         Ok(TaskTotals { nodes: 1 + made.nodes, roots: made.roots, last })
     }
 
@@ -410,7 +425,10 @@ impl BuildInputs<'_> {
             let room_to_sort = if is_last { spare.len() } else { count };
             let spare = take(&mut spare, room_to_sort);
             let range = start..end;
-            let part = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
+            // `control` reports from the thread that builds alone.
+            let goes_on = |_| true;
+            let part =
+                UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts, goes_on };
             start = end;
             child += room as u32;
             part

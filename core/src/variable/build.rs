@@ -250,6 +250,7 @@ fn run(
         let is_crowded = ids.len() > subdivide_above as usize;
         if is_crowded && spread.subdivide(plan.density, &mut bench, &mut pool) {
             entry(slot, start | GRID);
+            watch.between(u32::try_from(slot).unwrap_or(u32::MAX), slot_count, [0.5, 1.0])?;
         } else {
             entry(slot, start);
             // An exhausted pool is legal: it counts.
