@@ -651,9 +651,9 @@ typedef struct hgrid_config {
      * a few hundred times. `done` grows from call to call; the last call of a build that succeeds gets
      * `HGRID_PROGRESS_END`, and its result is ignored. After false the build ends with
      * `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. Calls are not spread
-     * evenly: during the longest step of a tree or of a variable grid, which may take most of the time of a
-     * build, there is none. The callback may query and build other grids. It must not touch the regions of
-     * this build, change its mesh, or be left by `longjmp` or by a C++ exception.
+     * evenly: there is none while several tasks run, or while a tree of `HGRID_QUALITY_HIGH` gets its top
+     * nodes. Each may take most of the time of a build. The callback may query and build other grids. It
+     * must not touch the regions of this build, change its mesh, or be left by `longjmp` or by a C++ exception.
      */
     bool (*progress)(void *context, uint32_t done);
 } hgrid_config;
@@ -2358,7 +2358,7 @@ hgrid_status hgrid_open(const void *blob,
  * the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
  * about as the cost does, if the box of the tree stays about as large. A cost is relative to the surface of this box,
  * so one vertex that moves far away makes it small. Where that may be, multiply each cost by the surface of the box
- * that all vertices have then, and compare the products.
+ * around all vertices at that time, and compare the products.
  *
  * A triangle that the build left out, because a coordinate was not finite or beyond 2^120, is in no leaf. If it fits
  * now, the call fails: build again. Scenes that show the grid need `hgrid_refit_scene` next, the innermost first: they
@@ -2737,7 +2737,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * is 0; `scene` may not be NULL. `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be
  * NULL. Index and scratch are compared with view, blob and arrays of each object, `scene` with each object's view
  * alone. What an inner scene shows is not looked at, and must lie elsewhere.
- * The call writes anywhere in as much of the index as `hgrid_scene_bound` tells, and touches none of what is behind.
+ * The call writes anywhere in as much of the index as `hgrid_scene_bound` tells for this configuration, and touches
+ * none of what is behind.
  *
  * Returns `HGRID_OK` and writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index
  * holds nothing of use:
@@ -2908,7 +2909,7 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
  * `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
  * The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
  * `grid` may be NULL. Returns true and has written those that are not NULL; or returns false and has written nothing:
- * `scene` or `hit` is NULL, or the hit names nothing in the scene.
+ * `scene` or `hit` is NULL, the view is one of zeros, or the hit names nothing in the scene.
  *
  * Threads: any number of calls and queries on the same scene at once.
  */
@@ -2918,11 +2919,12 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         struct hgrid_grid *grid);
 
 /**
- * Tells an instance on the path of a hit: what `hgrid_scene_locate` tells of the innermost one.
+ * Tells which instance is at a level of the path of a hit. `hgrid_scene_locate` tells the innermost one, and its grid.
  *
- * `level` 0 is the instance in `scene` itself, 1 that in the scene which this one shows, and so on: the number of the
- * instance is `path[level]` of the hit. Returns true and writes `instance`; or returns false and writes nothing: a
- * pointer is NULL, the view is one of zeros, the hit names nothing in the scene, or its path has no such level.
+ * At level 0 is an instance of `scene` itself. If it shows a scene, an instance of that is at level 1, and so on. The
+ * number of the instance is `path[level]` of the hit. Returns true and writes `instance`; or returns false and writes
+ * nothing: a pointer is NULL, the view is one of zeros, the hit names nothing in the scene, or its path has no such
+ * level.
  *
  * Threads: any number of calls and queries on the same scene at once.
  */

@@ -1805,7 +1805,8 @@ public:
     /// The options refer to the filter: give it a name.
     template <class F>
     scene_options &filter(const F &&) = delete;
-    /// The filter is asked about triangles whose mask in their mesh has a bit in common with this one; with 0, about all.
+    /// The filter is asked about triangles whose mask in their mesh has a bit in common with this one; the others are
+    /// opaque and count unasked. With 0 or all bits it is asked about every triangle.
     scene_options &filter_mask(std::uint32_t bits) noexcept { return raw_.filter_mask = bits, *this; }
     /// The struct that C takes.
     const ::hgrid_scene_options &c() const noexcept { return raw_; }
@@ -2161,8 +2162,8 @@ public:
         return found;
     }
     /// A normal of the object that was hit, of any length, as it is in the scene, of length 1; zeros if the hit names
-    /// nothing, or the normal is null. This is right for shapes of yours, and for triangles with normals of their own
-    /// at the vertices, however the instance turns, mirrors, shears or scales.
+    /// nothing, or the normal is zero or not finite. This is right for shapes of yours, and for triangles with normals
+    /// of their own at the vertices, however the instance turns, mirrors, shears or scales.
     point normal(const scene_hit &of, const point &object_normal) const noexcept
     {
         point found = {};

@@ -74,7 +74,7 @@ pub unsafe extern "C" fn hgrid_open(
 /// the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
 /// about as the cost does, if the box of the tree stays about as large. A cost is relative to the surface of this box,
 /// so one vertex that moves far away makes it small. Where that may be, multiply each cost by the surface of the box
-/// that all vertices have then, and compare the products.
+/// around all vertices at that time, and compare the products.
 ///
 /// A triangle that the build left out, because a coordinate was not finite or beyond 2^120, is in no leaf. If it fits
 /// now, the call fails: build again. Scenes that show the grid need `hgrid_refit_scene` next, the innermost first: they

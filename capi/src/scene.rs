@@ -317,7 +317,8 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// is 0; `scene` may not be NULL. `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be
 /// NULL. Index and scratch are compared with view, blob and arrays of each object, `scene` with each object's view
 /// alone. What an inner scene shows is not looked at, and must lie elsewhere.
-/// The call writes anywhere in as much of the index as `hgrid_scene_bound` tells, and touches none of what is behind.
+/// The call writes anywhere in as much of the index as `hgrid_scene_bound` tells for this configuration, and touches
+/// none of what is behind.
 ///
 /// Returns `HGRID_OK` and writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index
 /// holds nothing of use:

@@ -12,7 +12,7 @@ use crate::types::hgrid_grid;
 /// `grid` becomes a copy of your own view, or of the one in the `views` of a packed scene.
 /// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
 /// `grid` may be NULL. Returns true and has written those that are not NULL; or returns false and has written nothing:
-/// `scene` or `hit` is NULL, or the hit names nothing in the scene.
+/// `scene` or `hit` is NULL, the view is one of zeros, or the hit names nothing in the scene.
 ///
 /// Threads: any number of calls and queries on the same scene at once.
 ///
@@ -30,11 +30,12 @@ pub unsafe extern "C" fn hgrid_scene_locate(
     matches!(unsafe { raw::scene_locate(scene, hit, to) }, Ok(Some(())))
 }
 
-/// Tells an instance on the path of a hit: what `hgrid_scene_locate` tells of the innermost one.
+/// Tells which instance is at a level of the path of a hit. `hgrid_scene_locate` tells the innermost one, and its grid.
 ///
-/// `level` 0 is the instance in `scene` itself, 1 that in the scene which this one shows, and so on: the number of the
-/// instance is `path[level]` of the hit. Returns true and writes `instance`; or returns false and writes nothing: a
-/// pointer is NULL, the view is one of zeros, the hit names nothing in the scene, or its path has no such level.
+/// At level 0 is an instance of `scene` itself. If it shows a scene, an instance of that is at level 1, and so on. The
+/// number of the instance is `path[level]` of the hit. Returns true and writes `instance`; or returns false and writes
+/// nothing: a pointer is NULL, the view is one of zeros, the hit names nothing in the scene, or its path has no such
+/// level.
 ///
 /// Threads: any number of calls and queries on the same scene at once.
 ///

@@ -72,7 +72,8 @@ pub struct QueryOptions<'q> {
     pub filter: Option<&'q mut Filter<'q>>,
     /// The filter is asked about a triangle if a bit of this is set in its mask, too. The others are opaque: their hits
     /// count, and rays that meet only them cost what they cost without a filter. The default is all bits: the filter is
-    /// asked about every triangle, even one whose mask is 0.
+    /// asked about every triangle, even one whose mask is 0. With 0 it is asked about none (in C, 0 stands for all
+    /// bits).
     pub filter_mask: u32,
     /// Counters that add up the work. With them, the rays of a batch are traced one by one, because the rays of a
     /// group share work that belongs to no single ray.

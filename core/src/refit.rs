@@ -29,7 +29,7 @@ pub struct Refit {
 /// `cost_before` of the first refit after a build, and build anew once `cost_after` is well above it: times
 /// of rays grow about as the cost does, if the box of the tree stays about as large. A cost is relative to the surface
 /// of this box, so one vertex that moves far away makes it small. Where that may be, multiply each cost by the surface
-/// of the box that all vertices have then, and compare the products.
+/// of the box around all vertices at that time, and compare the products.
 ///
 /// A triangle that the build left out, because a coordinate was not finite or beyond
 /// [`MAX_COORDINATE`](crate::MAX_COORDINATE), is in no leaf. If it fits now, the refit fails: build again.

@@ -70,9 +70,9 @@ pub struct Picture {
     pub pixels: Vec<Rgb>,
 }
 
-/// Makes a picture of the costs of the rays of a square picture, with a colour bar if there is room. The
-/// colours end at `top`, or by default at the cost that 99 of 100 rays do not exceed, rounded up to a round number.
-/// The number at the end is returned with the picture.
+/// Makes a picture of the costs of the rays of a square picture, with a colour bar if there is room. The colours end at
+/// `top`, or by default at the cost that 99 of 100 rays do not exceed. Either is rounded up to a round number. The
+/// number at the end is returned with the picture.
 ///
 /// # Errors
 /// If the bar's font cannot be read.

@@ -289,9 +289,21 @@ fn shapes_are_tested_once_for_each_ray() {
     let boxes = Boxes::new(&boxes).unwrap();
     let built = Built::shapes(boxes, &Config::default()).unwrap();
     let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+    // Rays side by side, then scattered ones, of which some start far away or with a negative `t_min`: groups hand
+    // these back. All directions differ.
+    let mut random = Random(17);
     let rays: Vec<_> = (0..640_u16)
         .map(|at| {
-            Ray::new([0.0, 0.0, 4.0], [0.05 * f32::from(at % 8), 0.005 * f32::from(at / 8), -4.0])
+            let across = [0.05 * f32::from(at % 8), 0.005 * f32::from(at / 8), -4.0];
+            if at < 320 {
+                return Ray::new([0.0, 0.0, 4.0], across);
+            }
+            let (from, to) = (random.point(), random.point());
+            let distance = if at % 8 == 0 { 1e5 } else { 1.0 };
+            let along: [f32; 3] = std::array::from_fn(|k| to[k] - from[k]);
+            let origin = std::array::from_fn(|k| to[k] - distance * along[k]);
+            let t_min = if at % 8 == 1 { -1.0 } else { 0.0 };
+            Ray { t_min, ..Ray::new(origin, along) }
         })
         .collect();
     let asked = Mutex::new(HashSet::new());

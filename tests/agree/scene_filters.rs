@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use hgrid_core::{Config, Object, SceneHit, SceneOptions, Strided, Verdict};
+use hgrid_core::{Coherence, Config, Object, SceneHit, SceneOptions, Strided, StridedMut, Verdict};
 use hgrid_tests::meshes::{ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -50,7 +50,7 @@ fn opaque_triangles_count_without_a_call() {
     const ASKED: u32 = 2;
     let meshes = [ball(6, 1.0), soup(200, 0.2, 5)];
     let masks = meshes.each_ref().map(|mesh| {
-        let masks = (0..mesh.indices.len()).map(|triangle| [1, 2, 6][triangle % 3]);
+        let masks = (0..mesh.indices.len()).map(|triangle| [1, 2, 6, 0][triangle % 4]);
         masks.collect::<Vec<u32>>()
     });
     let views: Vec<_> = meshes
@@ -77,8 +77,9 @@ fn opaque_triangles_count_without_a_call() {
             masks[object][hit.primitive as usize] & ASKED != 0
         };
         let [mut opaque, mut passed] = [0; 2];
-        for round in 0..300 {
-            let ray = ray(&mut random, round, 3.0);
+        let rays: Vec<_> = (0..300).map(|round| ray(&mut random, round, 3.0)).collect();
+        let mut answers = Vec::new();
+        for &ray in &rays {
             let mut all = |_: usize, hit: &SceneHit| {
                 if !is_asked(hit) || keeps(hit) { Verdict::Accept } else { Verdict::Reject }
             };
@@ -94,10 +95,29 @@ fn opaque_triangles_count_without_a_call() {
             let hit = scene.intersect_with(&ray, options);
             assert_eq!(hit, expected);
             assert_eq!(scene.occluded_with(&ray, options), expected.is_some());
+            answers.push(hit.unwrap_or(SceneHit::MISS));
             opaque += usize::from(hit.is_some_and(|hit| !is_asked(&hit)));
             passed += usize::from(hit != scene.intersect(&ray));
         }
         assert!(opaque > 20 && passed > 10, "{opaque} {passed}");
+
+        // A batch answers alike. A mask of 0 asks about no triangle.
+        let mut some = |_: usize, hit: &SceneHit| {
+            if keeps(hit) { Verdict::Accept } else { Verdict::Reject }
+        };
+        let mut options = SceneOptions { filter: Some(&mut some), ..SceneOptions::default() };
+        for filter_mask in [ASKED, 0] {
+            options.filter_mask = filter_mask;
+            let mut hits = vec![SceneHit::MISS; rays.len()];
+            let given = Strided::new(&rays);
+            let to = &mut StridedMut::new(&mut hits);
+            scene.intersect_n_with(&given, to, Coherence::Incoherent, &mut options).unwrap();
+            if filter_mask == 0 {
+                let plain = rays.iter().map(|ray| scene.intersect(ray).unwrap_or(SceneHit::MISS));
+                answers = plain.collect();
+            }
+            assert_eq!(hits, answers, "{filter_mask}");
+        }
     }
 }
 

@@ -121,10 +121,10 @@ static void zero_options(void)
     memset(&options_in_scene, 0, sizeof options_in_scene);
 }
 
-static void set_reserved(void)
+static void set_wrong_struct(void)
 {
     options.reserved = 1;
-    /* These have no such field. */
+    /* Those of a scene have no reserved field. */
     options_in_scene.struct_size--;
 }
 
@@ -145,7 +145,7 @@ static const struct {
     bool is_of_ray;
 } mistakes[] = {
     {"options", zero_options, false},
-    {"reserved", set_reserved, false},
+    {"struct", set_wrong_struct, false},
     {"cull", set_unknown_cull, false},
     {"ray", zero_rays, true},
 };

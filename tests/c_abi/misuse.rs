@@ -35,7 +35,7 @@ fn expected() -> BTreeSet<String> {
             match &*parameter.name {
                 "options" if !has_status => {
                     all.extend(
-                        ["options", "reserved", "cull"].map(|what| format!("{what} {function}")),
+                        ["options", "struct", "cull"].map(|what| format!("{what} {function}")),
                     );
                 }
                 "ray" => drop(all.insert(format!("ray {function}"))),
@@ -70,7 +70,7 @@ fn debug_builds_stop_at_mistakes_and_say_why() {
         let said = String::from_utf8(stopped.stderr).expect("text");
         assert_eq!(stopped.status.signal(), Some(SIGABRT), "{name}: {said}");
         let reason = match name.split(' ').next() {
-            Some("options" | "reserved") => "options that break the rules: wrong struct_size, ",
+            Some("options" | "struct") => "options that break the rules: wrong struct_size, ",
             Some("cull") => "options that break the rules: unknown cull",
             Some("ray") => "a ray of zeros",
             _ => panic!("{name}"),

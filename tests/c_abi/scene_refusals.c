@@ -219,7 +219,10 @@ static void what_scenes_refuse(void)
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_object_scene(&zeros, &object));
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_object_grid(&no_grid, &object));
     CHECK(!hgrid_intersect_scene(&zeros, &ray, NULL, &hit) && !hgrid_occluded_scene(&zeros, &ray, NULL));
+    hgrid_instance instance;
     CHECK(!hgrid_scene_normal(&zeros, &hit, NULL, normal));
+    CHECK(!hgrid_scene_instance(&zeros, &hit, 0, &instance));
+    CHECK(!hgrid_scene_locate(&zeros, &hit, &instance, NULL));
     hgrid_scene_hit miss = {INFINITY, 0, 0, HGRID_INVALID_ID, {99, 0, 0, 0}};
     CHECK(!hgrid_scene_normal(&scene, &miss, NULL, normal));
     hgrid_scene_surface surface;

@@ -66,8 +66,9 @@ void check_batches(const hgrid::scene &scene)
         return hit.path[0] == 1;
     };
     hgrid::scene_options asking;
-    asking.filter(second).filter_mask(0xffffffffu).count(work).cull(hgrid::culling::none).mask(0xffffffffu);
+    asking.filter(second).filter_mask(2).count(work).cull(hgrid::culling::none).mask(0xffffffffu);
     std::vector<hgrid::scene_hit> filtered(pixels.size());
+    CHECK(asking.c().filter_mask == 2);
     CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent, asking) == status::ok);
     CHECK(!shown.empty() && work.primitive_tests > 0);
     CHECK(scene.occluded_n(rays, dark, hgrid::coherence::coherent, asking) == status::ok);
@@ -357,6 +358,7 @@ void check_scenes()
     CHECK(whole && whole->intersect(left)->t == 8);
     CHECK(whole->instance_of(*found).translation[2] == -7 && whole->grid_of(*found).validate_bytes() > 0);
     CHECK(whole->instance_at(*found, 0)->translation[2] == -7 && !whole->instance_at(*found, 1));
+    CHECK(!whole->instance_at(hgrid::scene_hit{0, 0, 0, 0, {99, 0, 0, 0}}, 0));
     CHECK(hgrid::scene::open_packed(*packed, *views, hgrid::as_writable_bytes(scratch)));
     CHECK(static_cast<hgrid::content>(hgrid::peek(*packed)->content) == hgrid::content::packed_scene);
     instances[0].object = 2;

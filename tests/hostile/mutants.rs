@@ -105,7 +105,7 @@ fn accepted_mutants_of_fine_sides_answer_right() {
 }
 
 fn mutate_fine_sides(quality: Quality) {
-    let count = setting("HGRID_MUTANTS", rounds(50_000) as u64) / 500;
+    let count = (setting("HGRID_MUTANTS", rounds(50_000) as u64) / 500).max(20);
     let mut random = Random(setting("HGRID_SEED", 1));
     let seed = Seed::new(room_with(10), Config::from(Parameters::Bvh { quality }));
     let view = seed.mesh.view();
@@ -141,7 +141,7 @@ fn mutate_fine_sides(quality: Quality) {
             ends(&grid, &rays[..4]);
             refused += 1;
         }
-        // A refit writes right sides, or refuses what leads astray.
+        // After a refit that succeeds, the grid is valid again.
         if refit(copy.bytes_mut(), &view).is_ok() {
             prove(&Grid::open(copy.bytes(), view).unwrap()).unwrap();
         }

@@ -15,10 +15,10 @@
 //!   relative margin covers the first; [`growth_of_range`] adds twice the second.
 //! - **Zero directions.** Their inverse is [`STEEP`]. `validate` accepts no step below 2^-61 of the tree's extent and
 //!   no margin below 2^-10 of a step ([`fine`](super::fine)): together 2^-71 of the extent. A ray starts at most 4.5
-//!   extents from any side of the tree's box, so it moves along such an axis by less than half of that before it has
-//!   passed the tree. So a ray with a hit in a box starts inside by the other half and leaves the box eight extents
-//!   away or more, behind the tree; and a ray outside never enters. Products stay finite as long as the tree's extent
-//!   is below 2^50; beyond, a NaN counts as a box that is met.
+//!   extents from any side of the tree's box, so it moves along such an axis by less than 2^-72 of the extent before it
+//!   has passed the tree. So a ray with a hit in a box starts at least 2^-72 of the extent inside, and leaves the box
+//!   eight extents away or more, behind the tree; and a ray outside never enters. Products stay finite as long as the
+//!   tree's extent is below 2^50; beyond, a NaN counts as a box that is met.
 //! - **Far origins.** The ray starts at a point near the tree ([`Approach`]), which may be off the ray by
 //!   `slack`; near sides are that much nearer, far sides farther.
 //!

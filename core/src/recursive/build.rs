@@ -333,8 +333,8 @@ impl PlacedTriangle {
         Some(Self { reach, overlap, margin: lattice.margin() })
     }
 
-    /// Returns true if [`each_cell`](Self::each_cell) shows a cell. It looks at this cell alone, unless the triangle
-    /// overlaps none and this is the first of its box.
+    /// Returns true if [`each_cell`](Self::each_cell) shows a cell. It looks at this cell alone, unless the cell is the
+    /// first of its box and the triangle does not overlap it.
     pub(super) fn is_in(&self, node: &GridNode, cell: [u32; 3]) -> bool {
         let range = node.range(&self.reach);
         range.contains(cell)

@@ -44,7 +44,7 @@ struct ListChecks<'a> {
 /// The triangles in a grid.
 #[derive(Debug, Clone, Copy)]
 struct Contents {
-    /// Number of triangles; 0 for the root, of which nothing asks it.
+    /// Number of triangles; 0 for the root, where no check reads it.
     count: u32,
     /// Triangles of each of its cells, added up.
     references: u64,

@@ -233,7 +233,8 @@ impl<'a> Scene<'a> {
     }
 
     /// The instance at a level of the path of a hit: 0 is that of the outermost scene, and
-    /// [`instance_of`](Self::instance_of) gives the last one. `None` as there, and if the path has no such level.
+    /// [`instance_of`](Self::instance_of) gives the last one. `None` if the hit names nothing, or its path has no such
+    /// level.
     #[must_use]
     pub fn instance_at(&self, hit: &SceneHit, level: usize) -> Option<Instance> {
         self.place(hit)?.instances().nth(level)?.instance()

@@ -91,14 +91,14 @@ pub struct SceneOptions<'q> {
     /// The sides of triangles that are not hit. The front is decided in the space of the triangle's own mesh: an
     /// instance that mirrors does not turn it round.
     pub cull: Cull,
-    /// Decides whether a hit counts. Within an instance it is asked from near to far and about each triangle at most
-    /// once; instances come roughly front to back, so a hit that it accepts may still be replaced by a closer one of
-    /// another instance. What lies behind a hit that it accepted is not shown to it. [`Verdict::AcceptAndStop`] is
-    /// the same as [`Verdict::Accept`]. Shapes are not shown to it: their test decides.
+    /// Decides whether a hit counts. Within an instance it is asked from near to far and about each triangle that
+    /// `filter_mask` selects at most once; instances come roughly front to back, so a hit that it accepts may still be
+    /// replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
+    /// [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it: their test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
     /// The filter is asked about a triangle if a bit of this is set in the mask that the triangle has in its mesh, too.
     /// The others are opaque: their hits count without a call. The default is all bits: the filter is asked about every
-    /// triangle, even one whose mask is 0.
+    /// triangle, even one whose mask is 0. With 0 it is asked about none (in C, 0 stands for all bits).
     pub filter_mask: u32,
     /// Counters that add up the work: an instance that is offered is a primitive test. With counters or a filter, the
     /// rays of a batch are traced one by one.
