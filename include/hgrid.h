@@ -33,6 +33,8 @@
  *   hgrid_open, hgrid_peek, hgrid_validate,    stored grids; with the mesh in one file: hgrid_pack and
  *   hgrid_pack, hgrid_mesh_of                  hgrid_mesh_of; scenes with all they show: hgrid_pack_scene
  *   hgrid_inspect                              statistics of a grid
+ *   hgrid_box_of, hgrid_box_of_shapes,         the box of a grid, of shapes, of a scene: to place a camera
+ *   hgrid_box_of_scene
  *
  * Masks, culling, a triangle to skip, filters and counters are options of queries. hgrid_config has the
  * fields for a build on your threads, and for its progress.
@@ -2181,6 +2183,18 @@ bool hgrid_locate(const struct hgrid_grid *grid,
                   uint32_t *triangle);
 
 /**
+ * Tells the box of a grid: `corners` becomes six floats, the least x, y and z, then the greatest.
+ *
+ * It is the box of the mesh, larger by about 1e-5 of its extent, or one around the origin and smaller than 1e-33 if no
+ * triangle is finite. Returns true; or returns false and writes nothing, if `grid` or `corners` is NULL or the view is
+ * one of zeros.
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ */
+bool hgrid_box_of(const struct hgrid_grid *grid,
+                  float *corners);
+
+/**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but faster.
  *
@@ -2663,6 +2677,16 @@ hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
                                      const struct hgrid_query_options *options);
 
 /**
+ * Tells the box of all shapes: `hgrid_box_of` for a tree of shapes.
+ *
+ * Returns true; or returns false and writes nothing, if `shapes` or `corners` is NULL or the view is one of zeros.
+ *
+ * Threads: any number of calls and queries on the same tree at once.
+ */
+bool hgrid_box_of_shapes(const struct hgrid_shapes *shapes,
+                         float *corners);
+
+/**
  * Makes an object of a grid. The object keeps the address of this view, so the view stays where it is for as long as
  * scenes that show the object are queried.
  *
@@ -2901,6 +2925,16 @@ bool hgrid_intersect_scene(const struct hgrid_scene *scene,
 bool hgrid_occluded_scene(const struct hgrid_scene *scene,
                           const struct hgrid_ray_f64 *ray,
                           const struct hgrid_scene_options *options);
+
+/**
+ * Tells the box of all instances: `hgrid_box_of` for a scene.
+ *
+ * Returns true; or returns false and writes nothing, if `scene` or `corners` is NULL or the view is one of zeros.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ */
+bool hgrid_box_of_scene(const struct hgrid_scene *scene,
+                        float *corners);
 
 /**
  * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid

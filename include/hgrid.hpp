@@ -1416,6 +1416,13 @@ public:
         return ::hgrid_surface_at(&raw_, &along, &at, &found) ? optional<surface>(found)
                                                               : optional<surface>();
     }
+    /// The box of the grid and a little more: the least x, y and z, then the greatest; zeros for a view of nothing.
+    std::array<float, 6> box() const noexcept
+    {
+        std::array<float, 6> corners = {};
+        static_cast<void>(::hgrid_box_of(&raw_, corners.data()));
+        return corners;
+    }
     /// The mesh that a triangle is of, and its number there, in a grid of joined meshes; nothing if there is no
     /// such triangle.
     optional<location> locate(std::uint32_t primitive) const noexcept
@@ -1965,6 +1972,13 @@ public:
     {
         return occluded_n_in_c(rays, answers, know, &with.c());
     }
+    /// The box of all shapes and a little more: the least x, y and z, then the greatest.
+    std::array<float, 6> box() const noexcept
+    {
+        std::array<float, 6> corners = {};
+        static_cast<void>(::hgrid_box_of_shapes(&raw_, corners.data()));
+        return corners;
+    }
     /// The struct that C takes.
     const ::hgrid_shapes &c() const noexcept { return raw_; }
 
@@ -2190,6 +2204,13 @@ public:
         ::hgrid_grid found = HGRID_GRID_INIT;
         static_cast<void>(::hgrid_scene_locate(&raw_, &of, nullptr, &found));
         return view(found);
+    }
+    /// The box of all instances and a little more: the least x, y and z, then the greatest.
+    std::array<float, 6> box() const noexcept
+    {
+        std::array<float, 6> corners = {};
+        static_cast<void>(::hgrid_box_of_scene(&raw_, corners.data()));
+        return corners;
     }
     /// The struct that C takes.
     const ::hgrid_scene &c() const noexcept { return raw_; }

@@ -191,6 +191,13 @@ static void joined_meshes(void)
     MISSED(hgrid_locate.geometry, hgrid_locate(&grid, 0, NULL, &triangle));
     MISSED(hgrid_locate.triangle, hgrid_locate(&grid, 0, &geometry, NULL));
     CHECK(geometry == 77 && triangle == 77);
+    float corners[6];
+    const hgrid_grid nothing = HGRID_GRID_INIT;
+    MISSED(hgrid_box_of.grid, hgrid_box_of(NULL, corners));
+    MISSED(hgrid_box_of.corners, hgrid_box_of(&grid, NULL));
+    CHECK(!hgrid_box_of(&nothing, corners) && hgrid_box_of(&grid, corners));
+    for (int k = 0; k < 3; k++)
+        CHECK(corners[k] < corners[k + 3]);
     CHECK(hgrid_locate(&grid, 5, &geometry, &triangle) && geometry == 0 && triangle == 5);
 }
 

@@ -498,6 +498,11 @@ static void no_pointers(void)
     ALLOWED(hgrid_occluded_scene_n.rays, hgrid_occluded_scene_n(&inner, NULL, 0, NULL, 0, 0, how, NULL));
     ALLOWED(hgrid_occluded_scene_n.options, hgrid_occluded_scene_n(&inner, from, 0, dark, 0, all, how, NULL));
     hgrid_scene_surface at;
+    float corners[6];
+    MISSED(hgrid_box_of_shapes.shapes, hgrid_box_of_shapes(NULL, corners));
+    MISSED(hgrid_box_of_shapes.corners, hgrid_box_of_shapes(&shapes, NULL));
+    MISSED(hgrid_box_of_scene.scene, hgrid_box_of_scene(NULL, corners));
+    MISSED(hgrid_box_of_scene.corners, hgrid_box_of_scene(&inner, NULL));
     MISSED(hgrid_scene_surface_at.scene, hgrid_scene_surface_at(NULL, &wide, &scene_hit, &at));
     MISSED(hgrid_scene_surface_at.ray, hgrid_scene_surface_at(&inner, NULL, &scene_hit, &at));
     MISSED(hgrid_scene_surface_at.hit, hgrid_scene_surface_at(&inner, &wide, NULL, &at));

@@ -129,6 +129,29 @@ static void scenes_show_grids_shapes_and_scenes(void)
     CHECK(hit.primitive == alone.primitive && fabsf(hit.t - alone.t) < 1e-5f);
 }
 
+/* The box of an object alone is that of what is in it; that of a scene holds those of its instances. */
+static void boxes_hold_what_is_in_them(void)
+{
+    float of_grid[6], of_shapes[6], of_scene[6];
+    CHECK(hgrid_box_of(&grid, of_grid) && hgrid_box_of_shapes(&shapes, of_shapes));
+    CHECK(hgrid_box_of_scene(&inner, of_scene));
+    for (int k = 0; k < 3; k++) {
+        const float most = 1e-4f * (of_grid[k + 3] - of_grid[k]);
+        float least = INFINITY, greatest = -INFINITY;
+        for (uint32_t i = 0; i < mesh.vertex_count; i++) {
+            const float at = ((const float *)mesh.positions)[3 * i + k];
+            least = at < least ? at : least, greatest = at > greatest ? at : greatest;
+        }
+        CHECK(of_grid[k] <= least && least - of_grid[k] < most);
+        CHECK(of_grid[k + 3] >= greatest && of_grid[k + 3] - greatest < most);
+        for (uint32_t i = 0; i < SPHERES; i++)
+            CHECK(of_shapes[k] <= spheres[i].box[k] && of_shapes[k + 3] >= spheres[i].box[k + 3]);
+    }
+    /* Ten units from one instance to the next along x. */
+    const float last = 10.0f * (INSTANCES - 1);
+    CHECK(of_scene[0] <= of_grid[0] && of_scene[3] >= last && of_scene[3] < last + 2);
+}
+
 static unsigned shown;
 
 static hgrid_verdict no_even(void *context, const hgrid_scene_hit *hit)
@@ -293,6 +316,7 @@ int main(void)
     prepare();
     shapes_answer_as_a_loop_over_all();
     scenes_show_grids_shapes_and_scenes();
+    boxes_hold_what_is_in_them();
     filters_are_shown_hits_of_the_scene();
     a_filter_is_asked_about_the_bits_of_its_mask();
     a_refit_follows_the_instances();

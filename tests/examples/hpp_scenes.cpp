@@ -355,6 +355,7 @@ void check_scenes()
     auto views = hgrid::memory::allocate(hgrid::scene::view_bytes(*packed));
     CHECK(views && views->size() > 0 && hgrid::scene::view_bytes(hgrid::as_bytes(scene_index)) == 0);
     const auto whole = hgrid::scene::open_packed(*packed, *views);
+    CHECK(whole->box()[0] < whole->box()[3] && whole->grid_of(*found).box()[0] < whole->grid_of(*found).box()[3]);
     CHECK(whole && whole->intersect(left)->t == 8);
     CHECK(whole->instance_of(*found).translation[2] == -7 && whole->grid_of(*found).validate_bytes() > 0);
     CHECK(whole->instance_at(*found, 0)->translation[2] == -7 && !whole->instance_at(*found, 1));
