@@ -105,7 +105,7 @@ fn accepted_mutants_of_fine_sides_answer_right() {
 }
 
 fn mutate_fine_sides(quality: Quality) {
-    let count = (setting("HGRID_MUTANTS", rounds(50_000) as u64) / 500).max(20);
+    let count = (setting("HGRID_MUTANTS", rounds(50_000) as u64) / 1000).max(20);
     let mut random = Random(setting("HGRID_SEED", 1));
     let seed = Seed::new(room_with(10), Config::from(Parameters::Bvh { quality }));
     let view = seed.mesh.view();
