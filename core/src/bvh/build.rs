@@ -354,7 +354,7 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
             end = unit.end;
             roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
             if !goes_on(end) {
-                // What is made is of no use.
+                // The build was cancelled: nothing that it made is used.
                 end = range.end;
                 break;
             }
@@ -425,7 +425,7 @@ impl BuildInputs<'_> {
             let room_to_sort = if is_last { spare.len() } else { count };
             let spare = take(&mut spare, room_to_sort);
             let range = start..end;
-            // `control` reports from the thread that builds alone.
+            // Only the thread that builds may report progress.
             let goes_on = |_| true;
             let part =
                 UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts, goes_on };

@@ -172,7 +172,7 @@ impl ListChecks<'_> {
             if !placed.is_in(node, *cell) {
                 return false;
             }
-            // Nothing asks how many triangles are in the root, where the first cell may be far from the others.
+            // No check reads the number of triangles in the root, and there the first cell may be far from this one.
             is_first = is_first && level > 0 && placed.first(node) == *cell;
             contents.count += u32::from(is_first);
             contents.reach = contents.reach.union(&placed.reach);

@@ -31,7 +31,7 @@ pub struct RenderArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub picture: Picture,
-    /// What the colours show
+    /// The quantity that the colours show
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
     /// Rays through each pixel, against jagged edges and noise, 1 to 1024 [default: 4; 1 for the four grids of the
@@ -50,8 +50,8 @@ pub struct RenderArgs {
     /// For heat: the work that is shown [default: cost]
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,
-    /// For heat: the number that is red, 1 or more, rounded up to a round one; the same in several pictures makes them
-    /// comparable [default: what 99 of 100 rays take at most]
+    /// For heat: the cost that is red, 1 or more, rounded up to a round number; give the same for pictures that are to
+    /// be compared [default: what 99 of 100 rays take at most]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = whole(1..=u32::MAX))]
     pub heat_top: Option<u32>,
     /// The structure to build
