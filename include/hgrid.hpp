@@ -514,13 +514,13 @@ bool goes_on(F &progress, float done, std::false_type) noexcept
 }
 
 // Returns the answer of a filter that takes a hit alone, or also its ray's place.
-template <class F>
-auto verdict_of(F &filter, std::size_t, const hit &at, std::true_type) noexcept
+template <class F, class Hit>
+auto verdict_of(F &filter, std::size_t, const Hit &at, std::true_type) noexcept
 {
     return filter(at);
 }
-template <class F>
-auto verdict_of(F &filter, std::size_t place, const hit &at, std::false_type) noexcept
+template <class F, class Hit>
+auto verdict_of(F &filter, std::size_t place, const Hit &at, std::false_type) noexcept
 {
     return filter(place, at);
 }
@@ -1796,16 +1796,20 @@ public:
     {
         return raw_.scratch = scratch.data(), raw_.scratch_bytes = scratch.size(), *this;
     }
-    /// Asks `callable` about hits of triangles, for each instance from near to far. It is called with the hit, and
-    /// returns a `verdict`, or a bool: whether the hit counts. In a batch one ray comes after the other.
+    /// Asks `callable` about hits of triangles, for each instance from near to far. It is called with the hit, or with
+    /// the ray's place in its batch and the hit, and returns a `verdict`, or a bool: whether the hit counts. In a batch
+    /// one ray comes after the other.
     template <class F>
     scene_options &filter(F &callable) noexcept
     {
         static_assert(!std::is_function<F>::value, "put the function into a lambda");
-        static_assert(detail::is_callable<F &, const scene_hit &>::value, "a filter is called with a hit");
+        static_assert(detail::is_callable<F &, const scene_hit &>::value ||
+                          detail::is_callable<F &, std::size_t, const scene_hit &>::value,
+                      "a filter is called with a hit, or with a place and a hit");
         raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
-        raw_.filter = [](void *context, const scene_hit *at) noexcept {
-            return detail::number((*static_cast<F *>(context))(*at));
+        raw_.filter = [](void *context, std::size_t place, const scene_hit *at) noexcept {
+            using takes_hit = detail::is_callable<F &, const scene_hit &>;
+            return detail::number(detail::verdict_of(*static_cast<F *>(context), place, *at, takes_hit()));
         };
         return *this;
     }

@@ -126,13 +126,19 @@ pub struct hgrid_scene_options {
     pub filter_mask: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
-    /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
-    /// far and about each triangle at most once; instances come roughly front to back, so a hit that it accepts may
-    /// be replaced by a closer one of another instance. What lies behind a hit that it accepted is not shown to it.
-    /// `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it. It runs on the calling
-    /// thread, may query the same scene, and must not be left by `longjmp` or by a C++ exception.
+    /// Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in its batch, 0
+    /// for a single ray. Within an instance it is asked from near to far and about each triangle at most once;
+    /// instances come roughly front to back, so a hit that it accepts may be replaced by a closer one of another
+    /// instance. What lies behind a hit that it accepted is not shown to it. In a batch it is asked about all hits of
+    /// one ray before those of the next. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to
+    /// it. It runs on the calling thread, may query the same scene, and must not be left by `longjmp` or by a C++
+    /// exception.
     pub filter: Option<
-        unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            ray: usize,
+            hit: *const hgrid_scene_hit,
+        ) -> hgrid_verdict,
     >,
     /// The counters that the work is added to, or NULL. An instance that a ray is tested against counts in
     /// `primitive_tests`.

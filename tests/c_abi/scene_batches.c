@@ -187,24 +187,26 @@ static void rays_and_answers_in_one_struct(hgrid_coherence coherence)
     CHECK(memcmp(as_expected, paths, SOME * sizeof *paths) == 0);
 }
 
-/* The hits that a filter was shown. */
+/* The hits that a filter was shown, and how many of each ray of a batch. */
 typedef struct {
     hgrid_scene_hit seen[8 * RAYS];
     size_t count;
+    unsigned of_ray[RAYS];
 } shown_hits;
 
-static hgrid_verdict note_and_reject_some(void *context, const hgrid_scene_hit *hit)
+static hgrid_verdict note_and_reject_some(void *context, size_t ray, const hgrid_scene_hit *hit)
 {
     shown_hits *const noted = (shown_hits *)context;
-    CHECK(noted->count < 8 * RAYS);
+    CHECK(noted->count < 8 * RAYS && ray < RAYS);
     noted->seen[noted->count++] = *hit;
+    noted->of_ray[ray]++;
     return (hit->primitive + hit->path[0]) % 3 == 0 ? HGRID_REJECT : HGRID_ACCEPT;
 }
 
 /* Filters see the same hits as for single rays, in the order of the rays, and the work is the same. */
 static void filters_and_counters_see_one_ray_after_the_other(void)
 {
-    static shown_hits alone, together;
+    static shown_hits alone, together, again;
     hgrid_counters work = {0, 0, 0};
     hgrid_scene_options options = usual_options;
     options.filter = note_and_reject_some, options.context = &alone, options.counters = &work;
@@ -213,6 +215,7 @@ static void filters_and_counters_see_one_ray_after_the_other(void)
     for (size_t c = 0; c < 2; c++) {
         hgrid_counters sum = {1, 2, 3};
         together.count = 0;
+        memset(together.of_ray, 0, sizeof together.of_ray);
         options.context = &together, options.counters = &sum;
         EXPECT(HGRID_OK, hgrid_intersect_scene_n(&all_kinds, rays, 0, hits, 0, RAYS, COHERENCES[c], &options));
         CHECK(memcmp(hits, expected, sizeof hits) == 0);
@@ -220,6 +223,15 @@ static void filters_and_counters_see_one_ray_after_the_other(void)
         CHECK(memcmp(together.seen, alone.seen, alone.count * sizeof *alone.seen) == 0);
         CHECK(sum.primitive_tests == work.primitive_tests + 1 && sum.cell_steps == work.cell_steps + 2 &&
               sum.grid_steps == work.grid_steps + 3);
+        for (int i = 0; i < RAYS; i++) {
+            hgrid_scene_hit hit;
+            again.count = 0;
+            options.context = &again;
+            CHECK(hgrid_intersect_scene(&all_kinds, &rays[i], &options, &hit) == expected_occluded[i]);
+            CHECK(again.count == together.of_ray[i]);
+        }
+        CHECK(again.of_ray[1] == 0);
+        options.context = &together;
         EXPECT(HGRID_OK, hgrid_occluded_scene_n(&all_kinds, rays, 0, occluded, 0, RAYS, COHERENCES[c], &options));
         CHECK(memcmp(occluded, expected_occluded, sizeof occluded) == 0);
     }

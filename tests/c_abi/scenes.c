@@ -154,9 +154,9 @@ static void boxes_hold_what_is_in_them(void)
 
 static unsigned shown;
 
-static hgrid_verdict no_even(void *context, const hgrid_scene_hit *hit)
+static hgrid_verdict no_even(void *context, size_t ray, const hgrid_scene_hit *hit)
 {
-    CHECK(context == &shown);
+    CHECK(context == &shown && ray == 0);
     shown++;
     return hit->primitive % 2 == 0 ? HGRID_REJECT : HGRID_ACCEPT;
 }
@@ -181,9 +181,10 @@ static void filters_are_shown_hits_of_the_scene(void)
     CHECK(hits > 10 && shown > 2 * hits / 2);
 }
 
-static hgrid_verdict reject(void *context, const hgrid_scene_hit *hit)
+static hgrid_verdict reject(void *context, size_t ray, const hgrid_scene_hit *hit)
 {
     (void)hit;
+    CHECK(ray == 0);
     ++*(unsigned *)context;
     return HGRID_REJECT;
 }

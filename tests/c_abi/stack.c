@@ -134,8 +134,9 @@ static float corner_boxes[SHAPES][6];
 static sheet link_mesh;
 static hgrid_grid link_tree;
 
-static hgrid_verdict reject_in_scene(void *context, const hgrid_scene_hit *hit)
+static hgrid_verdict reject_in_scene(void *context, size_t ray, const hgrid_scene_hit *hit)
 {
+    (void)ray;
     return context == &grid && hit->t >= 0 ? HGRID_REJECT : HGRID_ACCEPT;
 }
 

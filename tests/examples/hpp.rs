@@ -177,9 +177,10 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 79] = [
+const REFUSED: [(&str, &str); 80] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
+    ("auto f = [](int *) { return true; }; hgrid::scene_options().filter(f);", "called with a hit"),
     (
         "auto f = [](const hgrid::hit &) { return HGRID_ACCEPT_AND_STOP; }; hgrid::options().filter(f);",
         "answers with a hgrid::verdict",

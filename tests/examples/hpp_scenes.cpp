@@ -77,6 +77,17 @@ void check_batches(const hgrid::scene &scene)
         CHECK(alone ? is_same(*alone, filtered[i]) : filtered[i].primitive == hgrid::invalid_id);
         CHECK(scene.occluded(pixels[i].ray, asking) == (pixels[i].is_dark == 1));
     }
+    std::vector<unsigned> asked(pixels.size());
+    auto reject = [&](std::size_t place, const hgrid::scene_hit &) { return asked[place]++, false; };
+    asking.filter(reject).filter_mask(0);
+    CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent, asking) == status::ok);
+    for (std::size_t i = 0; i < pixels.size(); i++) {
+        unsigned calls = 0;
+        auto refuse = [&](const hgrid::scene_hit &) { return calls++, false; };
+        scene.intersect(pixels[i].ray, asking.filter(refuse));
+        CHECK(asked[i] == calls);
+    }
+    CHECK(asked != std::vector<unsigned>(pixels.size()));
     auto none = [](const hgrid::scene_hit &) { return hgrid::verdict::reject; };
     CHECK(!scene.occluded(hgrid::make_ray_f64({0.25, 0.25, 3}, {0, 0, -1}), hgrid::scene_options().filter(none)));
 

@@ -419,11 +419,11 @@ impl SceneAsked {
     /// The caller's promise.
     unsafe fn ask<T>(&self, ask: impl FnOnce(&mut SceneOptions<'_>) -> T) -> T {
         let hgrid_scene_options { mask, filter_mask, context, filter, counters, .. } = self.options;
-        let mut offer = |_: usize, hit: &SceneHit| {
+        let mut offer = |ray: usize, hit: &SceneHit| {
             let hit = hgrid_scene_hit::from(*hit);
             let Some(filter) = filter else { return Verdict::Accept };
             // SAFETY: a function of this type by the caller's promise; the hit lives until it returns.
-            verdict(unsafe { filter(context, &raw const hit) })
+            verdict(unsafe { filter(context, ray, &raw const hit) })
         };
         let mut work = Counters::default();
         let mut options = SceneOptions { mask, cull: self.cull, ..SceneOptions::default() };
