@@ -97,6 +97,45 @@ fn every_method_finds_what_a_loop_finds() {
     }
 }
 
+/// A small mesh far away: all distances round to the same number, so the lowest id wins, wherever it lies. A search
+/// that ends at that number misses what lies behind it and rounds to it.
+#[test]
+fn of_distances_that_round_to_the_same_the_lowest_id_wins() {
+    let mesh = soup(300, 0.1, 3).scaled(0.5_f32.powi(27));
+    for first in 0..3 {
+        let mut mesh = mesh.clone();
+        mesh.indices.rotate_left(first);
+        for config in configs() {
+            let owned = Owned::build(&mesh.view(), &config).unwrap();
+            let grid = owned.open(&mesh.view()).unwrap();
+            for side in 0..6 {
+                let mut point = [0.0; 3];
+                point[side / 2] = [-1.0, 1.0][side % 2];
+                let found = brute_force(&grid, point, f32::INFINITY, |_| true).unwrap();
+                assert_eq!((found.distance, found.primitive), (1.0, 0));
+                check(&grid, point, f32::INFINITY);
+            }
+        }
+    }
+}
+
+/// The loops of the other tests ask about each triangle by this function, so they would repeat its mistake.
+#[test]
+fn a_triangle_beyond_the_range_is_not_found() {
+    let mesh = one_triangle();
+    let triangle = mesh.view().triangle(0).unwrap();
+    for point in [[f32::MAX; 3], [-3e38, 0.0, 3e38], [f32::NAN, 0.0, 0.0], [f32::INFINITY; 3]] {
+        assert_eq!(ClosestPoint::on_triangle(&triangle, 0, point), None, "{point:?}");
+        for config in configs() {
+            let owned = Owned::build(&mesh.view(), &config).unwrap();
+            let grid = owned.open(&mesh.view()).unwrap();
+            let options = &mut QueryOptions::default();
+            assert_eq!(grid.closest_point(point, f32::INFINITY, options), None, "{point:?}");
+        }
+    }
+    assert!(ClosestPoint::on_triangle(&triangle, 0, [f32::MAX, 0.0, 0.0]).is_some());
+}
+
 /// Asks a tree at every SIMD level: the answer and the work are the same.
 fn check_levels(grid: &Grid<'_>, point: [f32; 3], within: f32) {
     let expected = brute_force(grid, point, within, |_| true);
