@@ -113,7 +113,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::bvh::layout::MOST_UNIT;
+    use crate::bvh::layout::{DIVISIONS, MOST_UNIT, most_nodes, most_of_root};
     use crate::random;
 
     /// The units of some bins, of which each holds what the layout promises.
@@ -145,6 +145,33 @@ mod tests {
         }
         assert_eq!(end, all, "{sizes:?}: {units:?}");
         units
+    }
+
+    /// The bound of [`layout`](crate::bvh::layout) has room for the most nodes that its rules allow. Each crowd here is
+    /// divided [`DIVISIONS`] times. Each division but the last leaves one triangle behind a crowded bin: a root by
+    /// itself. The last one makes roots with as many nodes below them as the budget allows. Above the roots are 4/7
+    /// nodes for each.
+    #[test]
+    fn the_bound_has_room_for_roots_behind_crowded_bins() {
+        const CROWDS: usize = 100;
+        const INSIDE: usize = MOST_UNIT + 1;
+        let late = DIVISIONS as usize - 1;
+        let (mut budget, mut start, mut roots, mut below) = (RootBudget::default(), 0, late, 0);
+        while start < INSIDE {
+            // The fewest triangles with a node below their root, and with two nodes.
+            let fits = |&end: &usize| {
+                end <= INSIDE && budget.clone().take_roots(&(start..end), INSIDE - end)
+            };
+            let end = [start + 13, start + 25].into_iter().find(fits).unwrap_or(INSIDE);
+            budget.take_roots(&(start..end), INSIDE - end);
+            (roots, below) =
+                (roots + 1, below + most_of_root(end - start).min((end - start - 1) / 7));
+            start = end;
+        }
+        let triangles = u32::try_from(CROWDS * (INSIDE + late)).unwrap();
+        let nodes = CROWDS * (7 * below + 11 * roots) / 7;
+        let most = most_nodes(triangles) as usize;
+        assert!(nodes <= most, "{nodes} of {most}");
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "small")]
