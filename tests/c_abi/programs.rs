@@ -290,9 +290,9 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 9 KiB for a ray or a point, 40 KiB for a batch, 18 KiB for a build, 96 KiB for one
-/// with tasks and 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 9 KiB for a grid; for a
-/// batch in a scene 80 KiB, and 8 KiB for each scene inside it.
+/// The header promises 9 KiB for a ray or a point (docs/embedded.md: 7 KiB in a tree of up to 14 levels), 40 KiB for a
+/// batch, 18 KiB for a build, 96 KiB for one with tasks and 13 KiB for a task; for a ray in scenes 8 KiB for each of
+/// them and 9 KiB for a grid; for a batch in a scene 80 KiB, and 8 KiB for each scene inside it.
 #[test]
 fn queries_and_builds_take_little_stack() {
     takes_little_stack(&[PART]);
@@ -317,6 +317,13 @@ fn takes_little_stack(arguments: &[&str]) {
     let deep = 449 * 8;
     for name in ["one", "options", "closest", "shapes"] {
         assert!((deep + 2000..9 << 10).contains(&most(name)), "{name}: {}", most(name));
+    }
+    assert!(most("levels") > 14, "no deep tree");
+    // The stack of a walk through a tree of few levels is a smaller one, which some rays take behind their first one.
+    let small = 99 * 8;
+    for (name, least) in [("one", 2800), ("options", 4100), ("closest", 2000), ("shapes", 1900)] {
+        let bytes = most(&format!("{name}_few"));
+        assert!((small + least..7 << 10).contains(&bytes), "{name}: {bytes} with few levels");
     }
     // The buffers alone hold 128 rays and 128 hits.
     for name in ["many", "shapes_many"] {

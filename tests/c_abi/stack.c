@@ -1,24 +1,20 @@
-/* Prints the stack use of queries and builds in bytes, one "name most" a line: the most over all methods and
- * meshes, on a stack that was filled before. The meshes are a sheet, the sheet with a crowd of small
- * triangles on it, for trees (with an argument for all methods) the sheet with a crowd in the crowd, and for trees
- * the sheet in a tangle. Grids also stand in scenes, and their triangles serve as shapes.
+/* Prints the stack use of queries and builds in bytes, one "name most" a line: the most over all methods and meshes
+ * (stack.h), on a stack that was filled before. A line "name_few most" tells the same of trees of few levels only, and
+ * "levels most" the levels of the deepest tree.
+ * Grids also stand in scenes, and their triangles serve as shapes.
  *
  * A ray that meets many boxes at once takes more stack than others. In a tangle it does: long triangles overlap, and
  * a chain of ever smaller ones makes a deep tree. The instances of a scene have such a chain, too. */
 
 #include "check.h"
+#include "stack.h"
 
 #include <ucontext.h>
 
-enum { TILED = 768, RAYS = TILED + 256, STACK = 256 * 1024, CROWDS = 2, CROWD = 17000 };
-/* The triangles of a tangle, and those of them in the chain. A mesh with a tangle has the number behind the crowds. */
-enum { TANGLE = 1480, CHAIN = 480, TANGLED = CROWDS + 1 };
+enum { TILED = 768, RAYS = TILED + 256, STACK = 256 * 1024 };
 
-/* The centre of the crowds, and half the width of each. */
-static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};
-
-static float positions[VERTICES + CROWDS * CROWD * 3][3];
-static uint32_t indices[TRIANGLES + CROWDS * CROWD][3];
+/* Rays take less stack in trees of no more levels; and the place of their number in a blob (docs/format.md). */
+enum { FEW_LEVELS = 14, LEVELS_AT = 116 };
 
 static hgrid_mesh mesh;
 /* The mesh is a tangle, which takes rays long. */
@@ -417,56 +413,20 @@ static void tasks(void)
     work(&by_many_tasks);
 }
 
-/* Returns a random number from -1 to 1. */
-static float random_number(void)
+/* Returns the levels of a tree, and 0 for another method. */
+static uint32_t levels_of(const void *blob)
 {
-    static uint32_t state = 1;
-    state = state * 1664525u + 1013904223u;
-    return (float)(state >> 8) / 8388608.0f - 1;
+    uint32_t levels;
+    memcpy(&levels, (const unsigned char *)blob + LEVELS_AT, sizeof levels);
+    return levels;
 }
 
-/* Returns the sheet with the first crowds. */
-static hgrid_mesh crowded(uint32_t crowds)
+/* Returns true if a mesh and a method are among those of a part: all methods over the sheet alone, trees over all
+ * crowds and the nested mesh, and trees of high quality over the tangle and the chain. */
+static bool is_of_part(uint32_t number, int method)
 {
-    static sheet data;
-    make_sheet(&data);
-    memcpy(positions, data.positions, sizeof data.positions);
-    memcpy(indices, data.indices, sizeof data.indices);
-    for (uint32_t i = 0; i < CROWDS * CROWD; i++) {
-        float center[3];
-        for (int axis = 0; axis < 3; axis++)
-            center[axis] = CENTER[axis] + WIDTH[i / CROWD] * random_number();
-        for (uint32_t corner = 0; corner < 3; corner++) {
-            const uint32_t vertex = VERTICES + 3 * i + corner;
-            indices[TRIANGLES + i][corner] = vertex;
-            for (int axis = 0; axis < 3; axis++)
-                positions[vertex][axis] = center[axis] + 0.03f * WIDTH[i / CROWD] * random_number();
-        }
-    }
-    hgrid_mesh all = mesh_of(&data);
-    all.positions = positions;
-    all.vertex_count = VERTICES + crowds * CROWD * 3;
-    all.indices = indices;
-    all.triangle_count = TRIANGLES + crowds * CROWD;
-    return all;
-}
-
-/* Returns the sheet in a tangle: long triangles, and a chain of triangles around the origin. */
-static hgrid_mesh tangled(void)
-{
-    hgrid_mesh all = crowded(0);
-    for (uint32_t i = 0; i < TANGLE; i++) {
-        /* Four triangles of each size. */
-        const float size = i < CHAIN ? ldexpf(1, -(int)(i / 4)) : 1;
-        for (uint32_t corner = 0; corner < 3; corner++) {
-            const uint32_t vertex = VERTICES + 3 * i + corner;
-            indices[TRIANGLES + i][corner] = vertex;
-            for (int axis = 0; axis < 3; axis++)
-                positions[vertex][axis] = size * random_number();
-        }
-    }
-    all.vertex_count += TANGLE * 3, all.triangle_count += TANGLE;
-    return all;
+    const bool is_high = number == TANGLED || number == LINKED, is_fast = number == CROWDS || number == NESTED;
+    return number == 0 || (is_high && method == METHODS) || (is_fast && method == METHODS - 1);
 }
 
 static void make_rays(void)
@@ -512,23 +472,23 @@ int main(int argc, char **argv)
     struct {
         const char *name;
         void (*call)(void);
-        size_t most;
-    } calls[] = {{"build", build, 0}, {"tasks", tasks, 0}, {"one", one, 0},
-                 {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0},
-                 {"scenes", build_scenes, 0}, {"scene", flat_scene, 0}, {"nested", nested_scenes, 0},
-                 {"scene_many", flat_scene_together, 0}, {"nested_many", nested_scenes_together, 0},
-                 {"shapes", boxes_of_triangles, 0}, {"shapes_many", boxes_of_triangles_together, 0}};
+        size_t most, most_few;
+    } calls[] = {{"build", build, 0, 0}, {"tasks", tasks, 0, 0}, {"one", one, 0, 0},
+                 {"options", with_options, 0, 0}, {"closest", closest, 0, 0}, {"many", many, 0, 0},
+                 {"scenes", build_scenes, 0, 0}, {"scene", flat_scene, 0, 0}, {"nested", nested_scenes, 0, 0},
+                 {"scene_many", flat_scene_together, 0, 0}, {"nested_many", nested_scenes_together, 0, 0},
+                 {"shapes", boxes_of_triangles, 0, 0}, {"shapes_many", boxes_of_triangles_together, 0, 0}};
+    uint32_t most_levels = 0;
     enum { CALLS = sizeof calls / sizeof *calls };
-    for (uint32_t crowds = 0; crowds <= TANGLED; crowds++)
+    for (uint32_t number = 0; number < MESHES; number++)
         for (int method = 0; method <= METHODS; method++) {
-            if (crowds == TANGLED && method < METHODS - 1)
+            if (number >= TANGLED && method < METHODS - 1)
                 continue;
-            /* Grids over crowds need no more stack and take half a minute. Apart from all methods over the sheet
-             * alone, a part has a tree over all crowds and one of high quality over the tangle. */
-            if (is_part && crowds > 0 && (crowds < CROWDS || method != METHODS - (crowds == CROWDS)))
+            /* Grids over crowds need no more stack and take half a minute. */
+            if (is_part && !is_of_part(number, method))
                 continue;
-            is_tangled = crowds == TANGLED;
-            mesh = is_tangled ? tangled() : crowded(crowds);
+            is_tangled = number >= TANGLED;
+            mesh = mesh_number(number);
             by_one_task = job_of(method, 1), by_many_tasks = job_of(method, HGRID_MAX_TASKS);
             for (int i = 0; i < CALLS; i++) {
                 /* The other methods always build with one task. */
@@ -536,10 +496,16 @@ int main(int argc, char **argv)
                     continue;
                 const size_t bytes = stack_of(calls[i].call);
                 calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
+                const bool is_of_shapes = i >= CALLS - 2;
+                const uint32_t levels = levels_of(is_of_shapes ? shape_blob : by_one_task.index);
+                most_levels = levels > most_levels ? levels : most_levels;
+                if (levels > 0 && levels <= FEW_LEVELS)
+                    calls[i].most_few = bytes > calls[i].most_few ? bytes : calls[i].most_few;
             }
         }
     for (int i = 0; i < CALLS; i++)
-        printf("%s %zu\n", calls[i].name, calls[i].most);
+        printf("%s %zu\n%s_few %zu\n", calls[i].name, calls[i].most, calls[i].name, calls[i].most_few);
+    printf("levels %u\n", (unsigned)most_levels);
     printf("task %zu\n", most_of_a_task);
     return 0;
 }
