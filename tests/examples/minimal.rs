@@ -1,20 +1,27 @@
 //! The smallest example, and the Makefile that builds all of them.
 
 use std::ffi::OsStr;
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::{root, run, target_dir};
+use hgrid_tests::copy::hash;
 use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::hpp::HELLO;
 use crate::ppm::Picture;
-use crate::programs::{compile, example};
+use crate::programs::{compile, example, raytracer};
+use crate::scenes::{INSTANCES, SPHERES};
 
 /// The output; the bytes are those of a tree, the method of a NULL configuration.
 const PRINTED: &str = "built a grid of 320 bytes\n\
                        hit triangle 0 at t = 1, u = 0.25, v = 0.5\n";
+
+/// The hashes of the ray tracer's pictures by the Makefile, with soft light and of the steps of rays.
+const RAYTRACER: u64 = 0xc5db_19f9_72ad_7dd3;
+const STEPS: u64 = 0xb20d_9dcc_5cdf_c365;
 
 #[test]
 fn minimal_prints_its_hit() {
@@ -67,12 +74,25 @@ fn the_makefile_builds_and_runs_all() {
     assert!(printed.contains(PRINTED), "{printed}");
     assert!(printed.contains("triangles      500000\n"), "{printed}");
     assert_eq!(printed.contains(HELLO), has_cpp, "{printed}");
+    let path = |name: &str| dir.path().join(name).with_extension("ppm");
+    let bytes = |name: &str| fs::read(path(name)).expect("a picture");
     for (name, size) in
         [("raytracer", (512, 512)), ("steps", (1024, 1024 + 26 * 4)), ("mapped", (512, 512))]
     {
-        let picture = Picture::load(&dir.path().join(name).with_extension("ppm"));
+        let picture = Picture::load(&path(name));
         assert_eq!((picture.width, picture.height), size, "{name}");
     }
+    // The Makefile promises the same bits on every machine.
+    for (name, expected) in
+        [("raytracer", RAYTRACER), ("steps", STEPS), ("spheres", SPHERES), ("instances", INSTANCES)]
+    {
+        let found = hash(&bytes(name));
+        assert_eq!(found, expected, "{name}.ppm has changed: {found:#x}");
+    }
+    // Two processes, and the ranks of MPI, draw what the ray tracer draws alone.
+    run(raytracer().args(["--size", "512", "--shadows", "-o"]).arg(path("alone")));
+    assert!(bytes("mapped") == bytes("alone"));
     assert_eq!(dir.path().join("mpi").exists(), has_mpi);
-    assert_eq!(dir.path().join("mpi.ppm").exists(), has_mpi);
+    assert_eq!(path("mpi").exists(), has_mpi);
+    assert!(!has_mpi || bytes("mpi") == bytes("alone"));
 }

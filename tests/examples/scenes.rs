@@ -40,5 +40,5 @@ fn instances_are_drawn() {
 }
 
 /// The hashes of the pictures, the same on every machine.
-const SPHERES: u64 = 0x1f32_09fc_3d25_e416;
-const INSTANCES: u64 = 0x1462_8e74_492e_8cf8;
+pub(crate) const SPHERES: u64 = 0x1f32_09fc_3d25_e416;
+pub(crate) const INSTANCES: u64 = 0x1462_8e74_492e_8cf8;
