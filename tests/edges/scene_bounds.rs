@@ -1,8 +1,9 @@
-//! A ray through shapes or a scene does no more than docs/bounds.md says, counted on trees that all lie at one place.
+//! A ray through shapes or a scene does no more than docs/bounds.md says, with a filter or without, alone or in a
+//! batch: counted on trees that all lie at one place.
 
 use hgrid_core::{
-    Boxes, Config, Counters, Instance, Method, Object, QueryOptions, Ray, RayF64, SceneOptions,
-    ShapeHit, Shapes,
+    Boxes, Coherence, Config, Counters, Instance, Method, Object, QueryOptions, Ray, RayF64, Scene,
+    SceneHit, SceneOptions, ShapeHit, Shapes, Strided, StridedMut, Verdict,
 };
 use hgrid_tests::meshes::Mesh;
 use hgrid_tests::owned::Owned;
@@ -30,6 +31,59 @@ fn plus(tree: [u64; 3], times: u32, object: [u64; 3]) -> [u64; 3] {
 fn hold(ray: &RayF64, work: &Counters, bound: [u64; 3]) {
     let done = [work.primitive_tests, work.cell_steps, work.grid_steps];
     assert!((0..3).all(|i| done[i] <= bound[i]), "{done:?} above {bound:?}, {ray:?}");
+}
+
+/// Walks of a grid whose filter rejects everything: for 1, 2, 4 and 8 hits, one for each sixteen after them, and one
+/// that finds the rest.
+const WALKS: u64 = 5 + TRIANGLES as u64 / 16 + 1;
+
+/// Counts what a query of so many rays does in a scene whose filter rejects everything.
+fn work_of_a_filter(ask: impl FnOnce(&mut SceneOptions<'_>)) -> Counters {
+    let mut work = Counters::default();
+    let reject = &mut |_: usize, _: &SceneHit| Verdict::Reject;
+    let (filter, counters) = (Some(reject as &mut _), Some(&mut work));
+    ask(&mut SceneOptions { filter, counters, ..SceneOptions::default() });
+    work
+}
+
+/// Asks with a filter about each ray alone, and about all in batches, which do no more. Returns the part of the bound
+/// that the ray with the most tests reaches.
+fn filters_hold(scene: &Scene<'_>, rays: &[RayF64], bound: [u64; 3]) -> f64 {
+    let mut most = 0.0_f64;
+    for is_any in [false, true] {
+        let mut alone = Counters::default();
+        for ray in rays {
+            let work = work_of_a_filter(|options| {
+                let is_hit = if is_any {
+                    scene.occluded_with(ray, options)
+                } else {
+                    scene.intersect_with(ray, options).is_some()
+                };
+                assert!(!is_hit);
+            });
+            hold(ray, &work, bound);
+            most = most.max(work.primitive_tests as f64 / bound[0] as f64);
+            alone.add(&work);
+        }
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let given = Strided::new(rays);
+            let work = work_of_a_filter(|options| {
+                if is_any {
+                    let mut occluded = vec![1_u8; rays.len()];
+                    let to = &mut StridedMut::new(&mut occluded);
+                    scene.occluded_n_with(&given, to, coherence, options).unwrap();
+                    assert!(occluded.iter().all(|&is_hit| is_hit == 0));
+                } else {
+                    let mut hits = vec![SceneHit { t: 0.0, ..SceneHit::MISS }; rays.len()];
+                    let to = &mut StridedMut::new(&mut hits);
+                    scene.intersect_n_with(&given, to, coherence, options).unwrap();
+                    assert!(hits.iter().all(|hit| *hit == SceneHit::MISS));
+                }
+            });
+            assert_eq!(work, alone, "{coherence:?}");
+        }
+    }
+    most
 }
 
 /// Returns the rays of the meshes, and the same from far away and from where only f64 reaches.
@@ -112,4 +166,12 @@ fn a_ray_tests_each_shape_and_enters_each_instance_once() {
     }
     // Some ray meets everything.
     assert!(most.iter().all(|&most| most > 0.99), "{most:?}");
+
+    // A filter multiplies the work in the mesh, and not that in the trees of the scenes and of the shapes.
+    let of_objects = plus(of_tree(SHAPES), 1, of_tree(TRIANGLES).map(|most| WALKS * most));
+    let of_inner = plus(of_tree(2 * INNER), INNER, of_objects);
+    let of_outer = plus(plus(of_tree(3 * OUTER), OUTER, of_objects), OUTER, of_inner);
+    let rays: Vec<_> = all_rays().into_iter().rev().step_by(15).collect();
+    let most = [filters_hold(&inner, &rays, of_inner), filters_hold(&outer, &rays[..1], of_outer)];
+    assert!(most.iter().all(|&most| most > 0.9), "{most:?}");
 }
