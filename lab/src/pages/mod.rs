@@ -161,12 +161,17 @@ impl Block<'_> {
             /// Missing where one thread builds.
             #[serde(default)]
             threads: u32,
+            /// The architecture and the vectors that the program was compiled for, if the command tells.
+            #[serde(default)]
+            target: Option<String>,
         }
         let lines = names.iter().map(|name| {
-            let Source { machine, threads } = self.read_one(name)?;
+            let Source { machine, threads, target } = self.read_one(name)?;
+            let target = target.map(|target| format!(", compiled for {target}"));
             let commit = machine.commit.as_ref().map(|commit| format!(", commit {commit}"));
-            let commit = commit.unwrap_or_default();
-            Ok(format!("- {name}: {}{commit}. `{}`", machine.summary(threads), machine.command))
+            let [target, commit] = [target, commit].map(Option::unwrap_or_default);
+            let summary = machine.summary(threads);
+            Ok(format!("- {name}: {summary}{target}{commit}. `{}`", machine.command))
         });
         Ok(lines.collect::<Result<Vec<_>>>()?.join("\n"))
     }
@@ -240,6 +245,22 @@ mod tests {
         assert!(filled.starts_with("a\n") && filled.ends_with("\nb\n"), "{filled}");
         assert!(filled.contains(name) && !filled.contains("old"), "{filled}");
         assert_eq!(fill(&filled).unwrap(), filled);
+    }
+
+    /// The compiler may use wider vectors than those of a default build, and they change times.
+    #[test]
+    fn sources_tell_the_target_where_a_result_does() {
+        let sources = |name: &str| {
+            let page = format!("{BEGIN}sources lab/results/{name}.json -->\n{END}\n");
+            fill(&root(), "docs/page.md", &page, &mut Vec::new()).unwrap()
+        };
+        let compared = sources("2026-11-28d_zen4_scans");
+        assert!(
+            compared
+                .contains(", compiled for x86_64, AVX-512, commit f0b0a394dc47. `hgrid compare "),
+            "{compared}"
+        );
+        assert!(!sources("2026-11-25_zen5_table_bunny").contains("compiled for"));
     }
 
     #[test]
