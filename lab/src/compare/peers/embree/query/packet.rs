@@ -50,9 +50,11 @@ impl Scene<'_> {
         hits: &mut [Hit],
     ) {
         let mut context = context(hint);
+        let mut both = RayHits { rays: no_rays(), hits: no_hits() };
         for (rays, answers) in rays.chunks(LANES).zip(hits.chunks_mut(LANES)) {
-            let (valid, rays) = packet(rays);
-            let mut both = RayHits { rays, hits: no_hits() };
+            let valid = both.rays.ask(rays);
+            // Of a hit, Embree only needs the geometry to be invalid.
+            both.hits.geometry = [ffi::INVALID_ID; LANES];
             // SAFETY: the scene is committed; the structs are those of the header, aligned; every lane has a mark.
             unsafe {
                 intersect(
@@ -62,7 +64,7 @@ impl Scene<'_> {
                     &raw mut both,
                 );
             };
-            let RayHits { rays, hits } = both;
+            let RayHits { rays, hits } = &both;
             for (lane, answer) in answers.iter_mut().enumerate() {
                 *answer = if hits.geometry[lane] == ffi::INVALID_ID {
                     Hit::MISS
@@ -82,28 +84,28 @@ impl Scene<'_> {
         occluded: &mut [u8],
     ) {
         let mut context = context(hint);
+        let mut packet = no_rays();
         for (rays, answers) in rays.chunks(LANES).zip(occluded.chunks_mut(LANES)) {
-            let (valid, mut rays) = packet(rays);
+            let valid = packet.ask(rays);
             // SAFETY: as in `intersect_packets_by`.
             unsafe {
                 occlude(
                     ptr::from_ref(&valid).cast(),
                     self.handle(),
                     &raw mut context,
-                    &raw mut rays,
+                    &raw mut packet,
                 );
             };
-            for (answer, &far) in answers.iter_mut().zip(&rays.far) {
+            for (answer, &far) in answers.iter_mut().zip(&packet.far) {
                 *answer = is_occluded(far).into();
             }
         }
     }
 }
 
-/// Makes a packet of up to `LANES` rays, axis by axis.
-fn packet<const LANES: usize>(rays: &[Ray]) -> (Valid<LANES>, Rays<LANES>) {
-    let mut valid = Valid([0; LANES]);
-    let mut packet = Rays {
+/// Makes a packet without rays.
+const fn no_rays<const LANES: usize>() -> Rays<LANES> {
+    Rays {
         origin: [[0.0; LANES]; 3],
         near: [0.0; LANES],
         direction: [[0.0; LANES]; 3],
@@ -112,17 +114,24 @@ fn packet<const LANES: usize>(rays: &[Ray]) -> (Valid<LANES>, Rays<LANES>) {
         mask: [u32::MAX; LANES],
         id: [0; LANES],
         flags: [0; LANES],
-    };
-    for (lane, ray) in rays.iter().enumerate().take(LANES) {
-        valid.0[lane] = -1;
-        for axis in 0..3 {
-            packet.origin[axis][lane] = ray.origin[axis];
-            packet.direction[axis][lane] = ray.direction[axis];
-        }
-        packet.near[lane] = ray.t_min;
-        packet.far[lane] = ray.t_max;
     }
-    (valid, packet)
+}
+
+impl<const LANES: usize> Rays<LANES> {
+    /// Sets the next rays, up to `LANES`, axis by axis, and marks their lanes. Embree changes nothing but the far ends.
+    fn ask(&mut self, rays: &[Ray]) -> Valid<LANES> {
+        let mut valid = Valid([0; LANES]);
+        for (lane, ray) in rays.iter().enumerate().take(LANES) {
+            valid.0[lane] = -1;
+            for axis in 0..3 {
+                self.origin[axis][lane] = ray.origin[axis];
+                self.direction[axis][lane] = ray.direction[axis];
+            }
+            self.near[lane] = ray.t_min;
+            self.far[lane] = ray.t_max;
+        }
+        valid
+    }
 }
 
 /// Makes hits without a geometry, for Embree to fill in.

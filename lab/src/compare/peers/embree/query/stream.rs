@@ -2,7 +2,7 @@
 //!
 //! Embree works on 32 rays of a stream at a time, whatever its length; for any-hit queries without the
 //! coherent flag it first gathers rays by octant. So the adapter hands over rays in lengths that stay in the
-//! first-level cache, in one buffer for all of them.
+//! caches next to the core (40 KiB for closest hits), in one buffer for all of them.
 
 use core::cell::RefCell;
 
