@@ -313,7 +313,8 @@ pub struct CompareArgs {
     /// For `bvh`: `high` takes a longer build, after which most rays are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
     pub quality: Option<Quality>,
-    /// The structures of other libraries, separated by commas [default: all that this program has]
+    /// The structures of other libraries, separated by commas [default: all that this program has, but for
+    /// embree-high and embree-robust]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
     /// The rays and points to ask for, separated by commas [default: all]

@@ -384,12 +384,44 @@ mod tests {
         check_instances(&methods(&[Method::Bvh]), 0);
     }
 
+    /// Every way to build with Embree.
+    #[cfg(feature = "embree")]
+    const EMBREE: [Peer; 7] = [
+        Peer::EmbreeLow,
+        Peer::EmbreeDynamic,
+        Peer::EmbreeMedium,
+        Peer::EmbreeHigh,
+        Peer::EmbreeRobust,
+        Peer::EmbreeCompact,
+        Peer::EmbreeLowCompact,
+    ];
+
+    /// Qualities and the flag COMPACT reach Embree: they show in its bytes.
+    #[cfg(feature = "embree")]
+    #[test]
+    fn embree_builds_as_its_names_say() {
+        let systems = peers::systems(&EMBREE).unwrap();
+        let comparison = compare_on(&[Workload::Ao], &systems);
+        let [knot, soup] = [&comparison.scenes[0].systems, &comparison.scenes[1].systems];
+        let bytes = |systems: &[numbers::SystemNumbers], peer: Peer| {
+            let system = systems.iter().find(|system| system.system == peer.name()).unwrap();
+            (system.index_bytes, system.peak_bytes)
+        };
+        for (compact, other) in
+            [(Peer::EmbreeCompact, Peer::EmbreeMedium), (Peer::EmbreeLowCompact, Peer::EmbreeLow)]
+        {
+            let [compact, other] = [compact, other].map(|peer| bytes(knot, peer));
+            assert!(10 * compact.0 < 7 * other.0 && compact.1 < other.1, "{compact:?}, {other:?}");
+        }
+        let [high, medium] = [Peer::EmbreeHigh, Peer::EmbreeMedium].map(|peer| bytes(soup, peer).0);
+        assert!(high > medium, "{high}, {medium}: no triangle was split");
+    }
+
     #[cfg(feature = "embree")]
     #[test]
     fn embree_agrees_with_hgrid_on_instances() {
         let mut systems = methods(&[Method::Bvh]);
-        let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
-        systems.extend(peers::systems(&embree).unwrap());
+        systems.extend(peers::systems(&EMBREE).unwrap());
         // The rows: two builds, bytes kept and bytes at most, coherent and single primary rays, ao, bounces,
         // and random rays against both qualities.
         check_instances(&systems, 10);
@@ -399,8 +431,7 @@ mod tests {
     #[test]
     fn embree_agrees_with_hgrid_on_spheres() {
         let mut systems = methods(&[Method::Bvh]);
-        let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
-        systems.extend(peers::systems(&embree).unwrap());
+        systems.extend(peers::systems(&EMBREE).unwrap());
         // The same rows as on instances.
         check_spheres(&systems, 10);
     }

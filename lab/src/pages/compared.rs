@@ -4,6 +4,7 @@ use anyhow::{Result, ensure};
 use comfy_table::{Cell, CellAlignment, Table};
 use serde::Deserialize;
 
+use crate::compare::ratios::is_of_best;
 use crate::machine::Machine;
 use crate::measure::ratio;
 use crate::table::{count, display_name, markdown, seconds};
@@ -94,6 +95,12 @@ fn have_all(files: &[Comparison], something: impl Fn(&Scene) -> bool) -> bool {
 }
 
 impl Scene {
+    /// Returns the ratios, except for those to a best peer in results that are older than the rule for these.
+    fn ratios(&self) -> impl Iterator<Item = &Ratio> {
+        let systems: Vec<_> = self.systems.iter().map(|system| &*system.system).collect();
+        self.ratios.iter().filter(move |ratio| is_of_best(&ratio.what, &systems))
+    }
+
     /// Returns the number of triangles or spheres, and that of instances if there are any.
     fn size(&self) -> String {
         match self.instances {
@@ -112,7 +119,7 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
     let columns = scenes(files).map(|(name, scene)| format!("{name} {}", scene.size()));
     let mut table = table("hgrid's default / peer", columns);
     let mut rows: Vec<&str> = Vec::new();
-    for ratio in scenes(files).flat_map(|(_, scene)| &scene.ratios) {
+    for ratio in scenes(files).flat_map(|(_, scene)| scene.ratios()) {
         if !rows.contains(&&*ratio.what) {
             rows.push(&ratio.what);
         }
@@ -120,7 +127,7 @@ pub(super) fn ratios(files: &[Comparison]) -> Result<String> {
     ensure!(!rows.is_empty(), NO_RATIOS);
     for row in rows {
         let cells = scenes(files).map(|(_, scene)| {
-            let ratio = scene.ratios.iter().find(|ratio| ratio.what == row);
+            let ratio = scene.ratios().find(|ratio| ratio.what == row);
             ratio.map_or_else(String::new, |ratio| format!("{:.2}", ratio.ratio))
         });
         table.add_row(core::iter::once(row.to_owned()).chain(cells));
@@ -137,7 +144,7 @@ pub(super) fn ratios_in_full(files: &[Comparison]) -> Result<String> {
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
         let mut table = table(&format!("{name}, {}", scene.size()), columns);
-        for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in &scene.ratios {
+        for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in scene.ratios() {
             let is_exact = what.contains("bytes");
             let number = |value: f64| {
                 if is_exact { format!("{value:.1}") } else { format!("{} s", seconds(value)) }
@@ -250,6 +257,28 @@ mod tests {
         assert!(table.contains("| build ") && table.contains("| rays "), "{table}");
         let error = ratios(&[file("hgrid compare", &[("a", &[])])]).unwrap_err().to_string();
         assert!(error.contains("no ratios"), "{error}");
+    }
+
+    #[test]
+    fn a_best_peer_of_older_results_is_shown_only_if_it_is_best() {
+        let mut file = file("hgrid compare", &[("a", &["rays", "peak bytes / best peer"])]);
+        let build = Build { seconds: 1.0 };
+        let system = |name: &str| System {
+            system: name.to_owned(),
+            is_peer: true,
+            first_build: build.clone(),
+            rebuild: build.clone(),
+            index_bytes: 1,
+            peak_bytes: 1,
+            runs: Vec::new(),
+        };
+        for (peer, is_shown) in [("embree-medium", false), ("embree-compact", true)] {
+            file.scenes[0].systems = vec![system(peer)];
+            for table in [ratios, ratios_in_full].map(|make| make(&[file.clone()]).unwrap()) {
+                assert!(table.contains("| rays "), "{table}");
+                assert_eq!(table.contains("| peak bytes "), is_shown, "{table}");
+            }
+        }
     }
 
     #[test]

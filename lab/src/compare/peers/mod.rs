@@ -28,6 +28,14 @@ pub enum Peer {
     EmbreeDynamic,
     /// Embree, build quality MEDIUM (binned SAH)
     EmbreeMedium,
+    /// Embree, build quality HIGH (SAH with spatial splits); only if it is named
+    EmbreeHigh,
+    /// Embree, build quality MEDIUM, scene flag ROBUST: no leaks at edges; only if it is named
+    EmbreeRobust,
+    /// Embree, build quality MEDIUM, scene flag COMPACT: less memory
+    EmbreeCompact,
+    /// Embree, build quality LOW, scene flag COMPACT
+    EmbreeLowCompact,
     /// tinybvh, binned SAH, two-wide
     Tinybvh2,
     /// tinybvh, binned SAH, eight-wide
@@ -55,6 +63,10 @@ impl Peer {
             Self::EmbreeLow => "embree-low",
             Self::EmbreeDynamic => "embree-dynamic",
             Self::EmbreeMedium => "embree-medium",
+            Self::EmbreeHigh => "embree-high",
+            Self::EmbreeRobust => "embree-robust",
+            Self::EmbreeCompact => "embree-compact",
+            Self::EmbreeLowCompact => "embree-low-compact",
             Self::Tinybvh2 => "tinybvh2",
             Self::Tinybvh8 => "tinybvh8",
             Self::Tinybvh8Hq => "tinybvh8-hq",
@@ -70,7 +82,13 @@ impl Peer {
     #[cfg(feature = "embree")]
     fn lack(self) -> Option<&'static str> {
         match self {
-            Self::EmbreeLow | Self::EmbreeDynamic | Self::EmbreeMedium => None,
+            Self::EmbreeLow
+            | Self::EmbreeDynamic
+            | Self::EmbreeMedium
+            | Self::EmbreeHigh
+            | Self::EmbreeRobust
+            | Self::EmbreeCompact
+            | Self::EmbreeLowCompact => None,
             _ if cfg!(not(feature = "peers")) => {
                 Some("is not in this program: build it with --features peers, not embree")
             }
@@ -84,13 +102,18 @@ impl Peer {
 
     #[cfg(feature = "embree")]
     fn system(self) -> Result<Box<dyn System>> {
+        use embree::{Embree, Quality};
         if let Some(lack) = self.lack() {
             anyhow::bail!("{} {lack}", self.name());
         }
         Ok(match self {
-            Self::EmbreeLow => Box::new(embree::Embree::new(self, embree::Quality::Low)?),
-            Self::EmbreeDynamic => Box::new(embree::Embree::new(self, embree::Quality::Dynamic)?),
-            Self::EmbreeMedium => Box::new(embree::Embree::new(self, embree::Quality::Medium)?),
+            Self::EmbreeLow => Box::new(Embree::new(self, Quality::Low)?),
+            Self::EmbreeDynamic => Box::new(Embree::new(self, Quality::Dynamic)?),
+            Self::EmbreeMedium => Box::new(Embree::new(self, Quality::Medium)?),
+            Self::EmbreeHigh => Box::new(Embree::new(self, Quality::High)?),
+            Self::EmbreeRobust => Box::new(Embree::new(self, Quality::Robust)?),
+            Self::EmbreeCompact => Box::new(Embree::new(self, Quality::Compact)?),
+            Self::EmbreeLowCompact => Box::new(Embree::new(self, Quality::LowCompact)?),
             #[cfg(feature = "peers")]
             Self::Tinybvh2 => Box::new(tinybvh::Tinybvh2(self)),
             #[cfg(all(feature = "peers", target_feature = "avx2"))]
@@ -113,14 +136,18 @@ impl Peer {
     }
 }
 
-/// Starts a system for each peer; for all that this program has if none is named.
+/// Starts a system for each peer. If none is named, starts all that this program has, except for two ways to build with
+/// Embree that no row of ratios names.
 ///
 /// # Errors
 /// If this program lacks one of the peers, or a library does not start.
 #[cfg(feature = "embree")]
 pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
-    let all = Peer::value_variants().iter().copied().filter(|peer| peer.lack().is_none());
-    let peers = if peers.is_empty() { all.collect() } else { peers.to_vec() };
+    let is_usual = |peer: &Peer| {
+        peer.lack().is_none() && !matches!(peer, Peer::EmbreeHigh | Peer::EmbreeRobust)
+    };
+    let usual = Peer::value_variants().iter().copied().filter(is_usual);
+    let peers = if peers.is_empty() { usual.collect() } else { peers.to_vec() };
     peers.into_iter().map(Peer::system).collect()
 }
 

@@ -3,7 +3,7 @@
 //! Below one, hgrid is better, in every row. Runs with wrong answers are left out. All rows show the same
 //! method of hgrid: the default one in either quality, or the first if that is not measured. A row shows a peer
 //! in its fastest mode, unless it names a mode. Every comparison of builds has two rows: the first build and the
-//! rebuild.
+//! rebuild. A row names a best peer only if Embree took part as it is best there, or not at all.
 
 mod entry;
 
@@ -49,7 +49,9 @@ impl Ratio {
             return Vec::new();
         };
         let builds = builds(hgrid, &peers);
-        builds.into_iter().chain(queries(hgrid, &peers)).flatten().collect()
+        let ratios = builds.into_iter().chain(queries(hgrid, &peers)).flatten();
+        let names: Vec<_> = systems.iter().map(|system| &*system.system).collect();
+        ratios.filter(|ratio| is_of_best(&ratio.what, &names)).collect()
     }
 
     fn new(what: String, ours: &Entry<'_>, theirs: &Entry<'_>) -> Option<Self> {
@@ -69,6 +71,19 @@ impl Ratio {
             most,
         })
     }
+}
+
+/// Returns false for a row that names a best peer, if Embree took part, but not as it is best in such a row.
+#[must_use]
+pub fn is_of_best(what: &str, systems: &[&str]) -> bool {
+    let best = if what.contains("bytes") {
+        [Peer::EmbreeCompact, Peer::EmbreeLowCompact]
+    } else {
+        [Peer::EmbreeLow, Peer::EmbreeDynamic]
+    };
+    let takes_part = best.iter().any(|peer| systems.contains(&peer.name()));
+    let is_embree = systems.iter().any(|system| system.starts_with("embree"));
+    takes_part || !is_embree || !what.contains("best peer")
 }
 
 /// Returns true if a system is the default method, in any quality.
@@ -304,13 +319,31 @@ mod tests {
         is("image / best peer: rebuild", [&with("coherent"), "embree-medium, packet8"], 3.0 / 5.5);
         is("image / best peer: first", [&with("coherent"), "embree-medium, packet8"], 5.0 / 10.5);
         is("build / Embree 3.13.5 LOW: rebuild", [name, "embree-low"], 2.0);
-        is("index bytes", [name, "tinybvh2"], 0.25);
+        assert!(ratios.iter().all(|ratio| !ratio.what.contains("bytes")));
         is("coherent primary", [&with("coherent"), "embree-medium, packet8"], 2.0);
         is("single primary", [&with("single"), "embree-medium, single"], 1.25);
         is("occlusion / Embree 3.13.5 MEDIUM", [&with("batch"), "embree-medium, stream"], 3.0);
         is("random", [&with("batch"), "embree-low, packet8"], 1.5);
         assert!(ratios.iter().all(|ratio| !ratio.what.contains("bounces")));
         assert!(Ratio::all(&systems[2..]).is_empty() && Ratio::all(&systems[..2]).is_empty());
+    }
+
+    #[test]
+    fn a_best_peer_is_named_only_if_embree_took_part_at_its_best() {
+        let name = Method::default().name();
+        let rows = |peers: &[&str]| {
+            let names = core::iter::once(&name).chain(peers);
+            let run: Timed<'_> = (Workload::Primary, Mode::Single, &[1.0], 0);
+            let systems: Vec<_> = names.map(|name| system(name, &[1.0], &[run])).collect();
+            let ratios = Ratio::all(&systems);
+            ["time to image / best peer", "bytes per triangle / best peer"]
+                .map(|words| ratios.iter().filter(|ratio| ratio.what.contains(words)).count())
+        };
+        assert_eq!(rows(&["tinybvh2"]), [2, 2]);
+        assert_eq!(rows(&["tinybvh2", "embree-medium"]), [0, 0]);
+        assert_eq!(rows(&["embree-medium", "embree-dynamic"]), [2, 0]);
+        assert_eq!(rows(&["embree-medium", "embree-compact"]), [0, 2]);
+        assert_eq!(rows(&["embree-low", "embree-low-compact"]), [2, 2]);
     }
 
     #[test]

@@ -27,20 +27,31 @@ pub(in super::super) enum Quality {
     Dynamic,
     /// The default: binned SAH.
     Medium,
+    /// SAH with spatial splits, for scenes that are traced for long.
+    High,
+    /// Medium, with boxes and tests that let no ray through an edge.
+    Robust,
+    /// Medium, with leaves that read the mesh instead of copies of it.
+    Compact,
+    /// Low, with such leaves.
+    LowCompact,
 }
 
 impl Quality {
     const fn number(self) -> c_uint {
         match self {
-            Self::Low | Self::Dynamic => ffi::BUILD_QUALITY_LOW,
-            Self::Medium => ffi::BUILD_QUALITY_MEDIUM,
+            Self::Low | Self::Dynamic | Self::LowCompact => ffi::BUILD_QUALITY_LOW,
+            Self::Medium | Self::Robust | Self::Compact => ffi::BUILD_QUALITY_MEDIUM,
+            Self::High => ffi::BUILD_QUALITY_HIGH,
         }
     }
 
     const fn flags(self) -> c_uint {
         match self {
-            Self::Low | Self::Medium => ffi::SCENE_NONE,
+            Self::Low | Self::Medium | Self::High => ffi::SCENE_NONE,
             Self::Dynamic => ffi::SCENE_DYNAMIC,
+            Self::Robust => ffi::SCENE_ROBUST,
+            Self::Compact | Self::LowCompact => ffi::SCENE_COMPACT,
         }
     }
 }

@@ -23,13 +23,16 @@ pub(super) const GEOMETRY_TYPE_INSTANCE: c_uint = 121;
 pub(super) const BUFFER_TYPE_INDEX: c_uint = 0;
 pub(super) const BUFFER_TYPE_VERTEX: c_uint = 1;
 
-/// `RTC_BUILD_QUALITY_LOW` and `RTC_BUILD_QUALITY_MEDIUM`.
+/// `RTC_BUILD_QUALITY_LOW`, `RTC_BUILD_QUALITY_MEDIUM` and `RTC_BUILD_QUALITY_HIGH`.
 pub(super) const BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const BUILD_QUALITY_MEDIUM: c_uint = 1;
+pub(super) const BUILD_QUALITY_HIGH: c_uint = 2;
 
-/// `RTC_SCENE_FLAG_NONE` and `RTC_SCENE_FLAG_DYNAMIC`.
+/// `RTC_SCENE_FLAG_NONE`, `RTC_SCENE_FLAG_DYNAMIC`, `RTC_SCENE_FLAG_COMPACT` and `RTC_SCENE_FLAG_ROBUST`.
 pub(super) const SCENE_NONE: c_uint = 0;
 pub(super) const SCENE_DYNAMIC: c_uint = 1;
+pub(super) const SCENE_COMPACT: c_uint = 2;
+pub(super) const SCENE_ROBUST: c_uint = 4;
 
 /// `RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT` and `RTC_INTERSECT_CONTEXT_FLAG_COHERENT`.
 pub(super) const CONTEXT_INCOHERENT: c_uint = 0;
