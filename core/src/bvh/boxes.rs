@@ -52,7 +52,7 @@ pub(crate) struct WideBoxes<V> {
 
 /// Rays for slab tests: one in all lanes, or one a lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Slabs<V> {
+pub(crate) struct SlabRays<V> {
     /// Minus the origin times the inverse direction.
     pub(crate) offset: [V; 3],
     pub(crate) inverse: [V; 3],
@@ -205,7 +205,7 @@ impl<V> WideBoxes<V> {
 
     /// Returns, for each lane, the distance at which the ray enters the box, and a mask of the lanes that meet.
     #[inline(always)]
-    pub(crate) fn meet<S: Simd>(&self, simd: S, rays: &Slabs<V>) -> (V, V::Mask)
+    pub(crate) fn meet<S: Simd>(&self, simd: S, rays: &SlabRays<V>) -> (V, V::Mask)
     where
         V: SimdFloat<S, Element = f32> + Extremes,
     {
@@ -219,7 +219,7 @@ impl<V> WideBoxes<V> {
     /// Returns the distances at which rays cross the near and the far sides on an axis. Their last bits differ between
     /// machines that fuse the sum and others. No hit depends on them, only the order of boxes.
     #[inline(always)]
-    fn cross<S: Simd>(&self, rays: &Slabs<V>, axis: usize) -> (V, V)
+    fn cross<S: Simd>(&self, rays: &SlabRays<V>, axis: usize) -> (V, V)
     where
         V: SimdFloat<S, Element = f32> + Extremes,
     {

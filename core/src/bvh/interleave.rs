@@ -136,7 +136,7 @@ fn enter_node<S: Simd>(
 ) -> Option<Child> {
     let node = bvh.nodes.get(number as usize)?;
     let boxes = WideBoxes::decode(simd, bvh, node, rays.center, rays.growth);
-    let (near, met) = boxes.meet(simd, &rays.slab(simd, one.ray));
+    let (near, met) = boxes.meet(simd, &rays.one(simd, one.ray));
     let near: [f32; WIDTH] = near.into();
     let near = |slot: u32| near[slot as usize % WIDTH];
     let mut rest = bits(met) & node.used();

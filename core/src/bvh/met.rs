@@ -108,7 +108,7 @@ fn one_by_one<S: Simd>(
         while rest != 0 {
             let bit = rest.trailing_zeros();
             rest &= rest - 1;
-            let (near, met) = boxes.meet(simd, &rays.slab(simd, first + bit));
+            let (near, met) = boxes.meet(simd, &rays.one(simd, first + bit));
             *met_by |= met.select(u32x8::splat(simd, 1 << bit), zero);
             if wants_near {
                 least = least.lesser(met.select(near, far_away));

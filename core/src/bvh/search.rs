@@ -9,7 +9,7 @@
 
 use super::Bvh;
 use super::nearest::ClosestSearch;
-use super::slab::Slab;
+use super::slab::SlabRay;
 use super::stack::{FIRST_STACK, StackEntry};
 use super::walk::{OneRay, Walk, Walked};
 use crate::aabb::Aabb;
@@ -50,7 +50,7 @@ impl Bvh<'_> {
         if approach.is_remote {
             return test_all(scope.mesh, &test, search, tally);
         }
-        let afar = (Slab::new(ray, part, &approach), test.filter);
+        let afar = (SlabRay::new(ray, part, &approach), test.filter);
         self.walk(scope, ray, part, cull, Some(&afar), search, tally);
     }
 
@@ -92,7 +92,7 @@ impl Bvh<'_> {
         if approach.is_remote {
             return test_all(scope.mesh, &TriangleTest::from(ray, &approach), search, counters);
         }
-        let afar = (Slab::along(ray, &approach, scale), RayFilter::NONE);
+        let afar = (SlabRay::along(ray, &approach, scale), RayFilter::NONE);
         self.walk(scope, ray, [t_min, t_max], Cull::None, Some(&afar), search, counters);
     }
 
@@ -105,7 +105,7 @@ impl Bvh<'_> {
         ray: &Ray,
         part: [f32; 2],
         cull: Cull,
-        afar: Option<&(Slab, RayFilter)>,
+        afar: Option<&(SlabRay, RayFilter)>,
         search: &mut F,
         tally: &mut T,
     ) -> bool {

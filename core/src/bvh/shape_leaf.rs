@@ -9,7 +9,7 @@
 use fearless_simd::{Simd, f32x4, f32x8};
 
 use super::node::WIDTH;
-use super::slab::{Slab, flips_of};
+use super::slab::{SlabRay, flips_of};
 use crate::aabb::{Aabb, greater, lesser};
 use crate::eight::{RowBytes, join, load, transpose};
 use crate::extremes::Extremes;
@@ -74,19 +74,19 @@ pub(super) fn pad_of(bounds: &Aabb) -> f32 {
 /// it meets before its end, and the entry distances.
 #[inline(never)]
 pub(super) fn meet_leaf(
-    slab: &Slab,
+    ray: &SlabRay,
     mesh: &TriangleMesh<'_>,
     ids: &[u32],
     pad: f32,
     end: f32,
 ) -> (u32, [f32; WIDTH]) {
-    let flips = flips_of(slab);
-    let (origin_near, origin_far) = (slab.origin_near.to_array(), slab.origin_far.to_array());
-    let (inverse, inverse_far) = (slab.inverse.to_array(), slab.inverse_far().to_array());
+    let flips = flips_of(ray);
+    let (origin_near, origin_far) = (ray.origin_near.to_array(), ray.origin_far.to_array());
+    let (inverse, inverse_far) = (ray.inverse.to_array(), ray.inverse_far().to_array());
     let (mut met, mut nearest) = (0, [0.0; WIDTH]);
     for (lane, (&id, nearest)) in ids.iter().zip(&mut nearest).enumerate() {
         let Some([a, b, _]) = mesh.triangle(id) else { continue };
-        let (mut near, mut far) = (slab.start, end);
+        let (mut near, mut far) = (ray.start, end);
         for axis in 0..3 {
             let (low, high) = (lesser(a[axis], b[axis]), greater(a[axis], b[axis]));
             let (first, last) = if flips[axis] == 0 { (low, high) } else { (high, low) };

@@ -80,9 +80,9 @@ pub(crate) fn ends_behind<S: Simd>(simd: S, t: [f32; 8], scale: [f32; 8], extent
     end + (end.abs() * (WIDER - 1.0) + growth)
 }
 
-/// A ray, ready for boxes.
+/// A ray prepared for slab tests.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Slab {
+pub(crate) struct SlabRay {
     /// Start of the ray, moved by the slack so that near sides come nearer and far ones go farther.
     pub(crate) origin_near: Vec3A,
     pub(crate) origin_far: Vec3A,
@@ -100,7 +100,7 @@ pub(crate) struct Slab {
     growth: f32,
 }
 
-impl Slab {
+impl SlabRay {
     /// A part of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther away, is
     /// empty or invalid, or has a very long or short direction.
     #[inline(always)]
@@ -138,7 +138,7 @@ impl Slab {
         // Hits that lie behind the origin are those of a negative `t_min`, wherever this walk begins.
         let origin_near =
             if ray.t_min < 0.0 { moved_back(origin, behind(distance), inverse) } else { origin };
-        let slab = Self {
+        let slab_ray = Self {
             origin_near,
             origin_far: origin,
             inverse,
@@ -151,7 +151,7 @@ impl Slab {
         };
         let sum = direction.abs().element_sum();
         let filter = RayFilter::nearby(ray.origin, direction.to_array(), sum, distance, extent);
-        Some((slab, filter))
+        Some((slab_ray, filter))
     }
 
     /// A part of a ray that starts where its approach says.
@@ -169,7 +169,7 @@ impl Slab {
         let inverse = Vec3A::new(inverse(x), inverse(y), inverse(z));
         let slack = approach.slack + behind(round(approach.reach.distance));
         let anchor = Vec3A::from(approach.anchor);
-        let mut slab = Self {
+        let mut slab_ray = Self {
             origin_near: moved_back(anchor, slack, inverse),
             origin_far: moved_back(anchor, slack, -inverse),
             inverse,
@@ -180,9 +180,9 @@ impl Slab {
             nearby: 0.0,
             growth: growth_of_range(round(approach.reach.extent), 1.0),
         };
-        slab.start = slab.earliest(begin);
-        slab.end = slab.latest(until);
-        slab
+        slab_ray.start = slab_ray.earliest(begin);
+        slab_ray.end = slab_ray.latest(until);
+        slab_ray
     }
 
     /// [`new`](Self::new) for a ray along which a `t` of its range or of a hit is `scale` times as large. In a tree of
@@ -190,10 +190,10 @@ impl Slab {
     #[cold]
     #[inline(never)]
     pub(crate) fn along(ray: &Ray, approach: &Approach, scale: f64) -> Self {
-        let mut slab = Self::new(ray, [ray.t_min, ray.t_max], approach);
-        (slab.t, slab.scale) = (slab.t / scale, slab.scale * scale);
-        (slab.start, slab.end) = (slab.earliest(ray.t_min), slab.latest(ray.t_max));
-        slab
+        let mut slab_ray = Self::new(ray, [ray.t_min, ray.t_max], approach);
+        (slab_ray.t, slab_ray.scale) = (slab_ray.t / scale, slab_ray.scale * scale);
+        (slab_ray.start, slab_ray.end) = (slab_ray.earliest(ray.t_min), slab_ray.latest(ray.t_max));
+        slab_ray
     }
 
     /// A distance no farther than that of any number that rounds to `t`.
@@ -246,8 +246,8 @@ pub(super) const FLIP: usize = 3;
 
 /// Finds the near side on each axis.
 #[inline(always)]
-pub(super) fn flips_of(slab: &Slab) -> NearSides {
-    slab.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
+pub(super) fn flips_of(ray: &SlabRay) -> NearSides {
+    ray.inverse.to_array().map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ use super::boxes::{bits, splat};
 use super::fine::FineSides;
 use super::node::{Child, Node, WIDTH, floats};
 use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
-use super::slab::{FLIP, NearSides, Slab, flips_of};
+use super::slab::{FLIP, NearSides, SlabRay, flips_of};
 use super::stack::{StackEntry, pop, push};
 use crate::aabb::{Aabb, greater, lesser};
 use crate::budget::Budget;
@@ -51,8 +51,8 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) cull: Cull,
     /// The box of the tree.
     pub(crate) bounds: &'r Aabb,
-    /// The slab and the filter of a ray from far away, which [`Slab::nearby`] cannot compute.
-    pub(crate) afar: Option<&'r (Slab, RayFilter)>,
+    /// A ray from far away, which [`SlabRay::nearby`] cannot prepare, and its filter.
+    pub(crate) afar: Option<&'r (SlabRay, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
     /// The place to resume at; `None` at the start.
@@ -82,7 +82,7 @@ pub(crate) struct Resume {
 pub(crate) enum Walked {
     /// The ray has passed the tree, or the search is over.
     Through,
-    /// [`Slab::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed.
+    /// [`SlabRay::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed.
     TooFar,
     /// The stack has no room for the children of a node. The walk may go on with a larger one.
     Full,
@@ -103,13 +103,13 @@ struct Wide<S: Simd> {
 
 impl<S: Simd> Wide<S> {
     #[inline(always)]
-    fn new(simd: S, slab: &Slab, filter: &RayFilter, leaves_at: Option<f32>) -> Self {
+    fn new(simd: S, ray: &SlabRay, filter: &RayFilter, leaves_at: Option<f32>) -> Self {
         Self {
-            origin_near: splat(simd, slab.origin_near.to_array()),
-            origin_far: splat(simd, slab.origin_far.to_array()),
-            inverse_near: splat(simd, slab.inverse.to_array()),
-            inverse_far: splat(simd, slab.inverse_far().to_array()),
-            start: f32x8::splat(simd, slab.start),
+            origin_near: splat(simd, ray.origin_near.to_array()),
+            origin_far: splat(simd, ray.origin_far.to_array()),
+            inverse_near: splat(simd, ray.inverse.to_array()),
+            inverse_far: splat(simd, ray.inverse_far().to_array()),
+            start: f32x8::splat(simd, ray.start),
             filter: filter.line,
             leaves_at,
         }
@@ -280,14 +280,14 @@ fn predicted(slot: u32) -> u32 {
 
 /// Does the same as [`Wide::meet`] box by box, without fine sides, for machines without vectors.
 #[inline(never)]
-fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
-    let flips = flips_of(slab);
+fn meet<S: Simd>(simd: S, ray: &SlabRay, node: &Node, end: f32) -> (u32, f32x8<S>) {
+    let flips = flips_of(ray);
     let (origin, steps) = (node.origin(), node.steps());
-    let (origin_near, origin_far) = (slab.origin_near.to_array(), slab.origin_far.to_array());
-    let (inverse, inverse_far) = (slab.inverse.to_array(), slab.inverse_far().to_array());
+    let (origin_near, origin_far) = (ray.origin_near.to_array(), ray.origin_far.to_array());
+    let (inverse, inverse_far) = (ray.inverse.to_array(), ray.inverse_far().to_array());
     let (mut met, mut nearest) = (0, [0.0; WIDTH]);
     for (slot, nearest) in nearest.iter_mut().enumerate() {
-        let (mut near, mut far) = (slab.start, end);
+        let (mut near, mut far) = (ray.start, end);
         for axis in 0..3 {
             let bound = |flip: usize| f32::from(row(node, axis, flip)[slot % WIDTH]);
             let near_side = bound(flips[axis]) * steps[axis] + (origin[axis] - origin_near[axis]);
@@ -324,24 +324,25 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let Walk { one, stack } = self;
         let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume } = one;
         let (part, cull, afar) = (*part, *cull, *afar);
-        let nearby = if afar.is_none() { Slab::nearby(ray, part, bounds) } else { afar.copied() };
-        let Some((slab, filter)) = nearby else { return Walked::TooFar };
-        let slab = &slab;
+        let nearby =
+            if afar.is_none() { SlabRay::nearby(ray, part, bounds) } else { afar.copied() };
+        let Some((slab_ray, filter)) = nearby else { return Walked::TooFar };
+        let slab_ray = &slab_ray;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
         // A ray from inside the box of the tree may leave a triangle.
         let origin = Vec3A::from(ray.origin);
         let may_leave = afar.is_none() && range::pays(bounds, &Aabb { min: origin, max: origin });
-        let leaves_at = may_leave.then(|| slab.distance(ray.t_min));
+        let leaves_at = may_leave.then(|| slab_ray.distance(ray.t_min));
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
         let wide = HAS_VECTORS.then(
             #[inline(always)]
-            || Wide::new(simd, slab, &filter, leaves_at),
+            || Wide::new(simd, slab_ray, &filter, leaves_at),
         );
         let wide = wide.as_ref().map(black_box);
-        let flips = flips_of(slab);
-        let start = Resume { number: 0, top: 0, end: slab.end, budget: bvh.budget() };
+        let flips = flips_of(slab_ray);
+        let start = Resume { number: 0, top: 0, end: slab_ray.end, budget: bvh.budget() };
         let Resume { number, mut top, mut end, mut budget } = resume.unwrap_or(start);
         let mut child = Child::Inner(number);
         loop {
@@ -358,7 +359,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                 // Intersect the ray with the eight boxes of the node.
                 let (met, near) = match wide {
                     Some(ray) => ray.meet(simd, node, bvh.fine_sides(node), flips, end),
-                    None => meet(simd, slab, node, end),
+                    None => meet(simd, slab_ray, node, end),
                 };
                 if met == 0 {
                     // Pop the next child.
@@ -379,7 +380,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
             tally.cell_step();
             tally.primitive_tests(ids.len());
             if F::OF_BOXES
-                && offer_leaf(simd, wide, slab, mesh, ids, flips, bounds, &mut end, *search)
+                && offer_leaf(simd, wide, slab_ray, mesh, ids, flips, bounds, &mut end, *search)
             {
                 return Walked::Through;
             }
@@ -394,7 +395,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
                 let Some(&id) = ids.get(lane) else { break };
                 match search.decided(TriangleTest::decide_for(ray, cull, mesh, id)) {
                     Outcome::Unchanged => {}
-                    Outcome::EndsAt(t) => end = slab.latest(t),
+                    Outcome::EndsAt(t) => end = slab_ray.latest(t),
                     Outcome::Done => return Walked::Through,
                 }
             }
@@ -411,7 +412,7 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
 fn offer_leaf<S: Simd, F: Search>(
     simd: S,
     wide: Option<&Wide<S>>,
-    slab: &Slab,
+    ray: &SlabRay,
     mesh: &TriangleMesh<'_>,
     ids: &[u32],
     flips: NearSides,
@@ -422,7 +423,7 @@ fn offer_leaf<S: Simd, F: Search>(
     let pad = pad_of(bounds);
     let (mut met, near) = match wide {
         Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, pad, *end),
-        None => meet_leaf(slab, mesh, ids, pad, *end),
+        None => meet_leaf(ray, mesh, ids, pad, *end),
     };
     while met != 0 {
         let lane = nearest_of(met, &near);
@@ -434,7 +435,7 @@ fn offer_leaf<S: Simd, F: Search>(
         }
         match search.offer(id) {
             Outcome::Unchanged => {}
-            Outcome::EndsAt(t) => *end = slab.latest(t),
+            Outcome::EndsAt(t) => *end = ray.latest(t),
             Outcome::Done => return true,
         }
     }
@@ -449,21 +450,21 @@ mod tests {
     use crate::simd::{SimdLevel, dispatch};
 
     /// A node against a ray, with the vectors of a level.
-    struct Both<'a>(&'a Slab, &'a Node, f32);
+    struct Both<'a>(&'a SlabRay, &'a Node, f32);
 
     impl Kernel for Both<'_> {
         type Output = [(u32, [f32; WIDTH]); 2];
 
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let Self(slab, node, end) = self;
-            let wide = Wide::new(simd, slab, &RayFilter::NONE, None).meet(
+            let Self(ray, node, end) = self;
+            let wide = Wide::new(simd, ray, &RayFilter::NONE, None).meet(
                 simd,
                 node,
                 None,
-                flips_of(slab),
+                flips_of(ray),
                 end,
             );
-            let one_by_one = meet(simd, slab, node, end);
+            let one_by_one = meet(simd, ray, node, end);
             [wide, one_by_one].map(|(met, near)| (met, near.into()))
         }
     }
@@ -502,10 +503,10 @@ mod tests {
                     node.bounds[axis + 3][slot] = a.max(b);
                 }
             }
-            let Some((slab, _)) = Slab::nearby(&ray, [0.0, 3.0], &bounds) else { continue };
+            let Some((slab_ray, _)) = SlabRay::nearby(&ray, [0.0, 3.0], &bounds) else { continue };
             for &level in &levels {
                 let [(met_wide, near_wide), (met, near)] =
-                    dispatch(level, Both(&slab, &node, slab.end));
+                    dispatch(level, Both(&slab_ray, &node, slab_ray.end));
                 assert_eq!(met_wide, met, "{level:?} {ray:?} {node:?}");
                 for slot in (0..WIDTH).filter(|slot| met >> slot & 1 == 1) {
                     assert_eq!(near_wide[slot].to_bits(), near[slot].to_bits());

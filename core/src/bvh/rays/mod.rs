@@ -14,7 +14,7 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use glam::Vec3A;
 use zerocopy::FromZeros;
 
-use super::boxes::{Beam, FEW_RAYS, Slabs, bits, splat};
+use super::boxes::{Beam, FEW_RAYS, SlabRays, bits, splat};
 use super::per_ray::{GROUP, OCTETS, PerRay, get, interval, octet_of, sixteen};
 use super::slab::{EARLIER, STEEP, TINY, WIDER};
 use crate::aabb::{Aabb, greater, lesser};
@@ -145,7 +145,7 @@ impl Rays {
                 & z.simd_eq(z);
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
-            // `Slab` has a margin for boxes behind the start; groups have none.
+            // `SlabRay` has a margin for boxes behind the start; groups have none.
             let start = if self.starts_at_box { t_min.greater(zero) } else { t_min };
             let is_near = a.greater(b).greater(c).simd_le(near)
                 & start.simd_ge(zero)
@@ -305,9 +305,9 @@ impl Rays {
 
     /// One ray in all lanes.
     #[inline(always)]
-    pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<f32x8<S>> {
+    pub(crate) fn one<S: Simd>(&self, simd: S, ray: u32) -> SlabRays<f32x8<S>> {
         let ([a, b, c], [d, e, f]) = (&self.offset, &self.inverse);
-        Slabs {
+        SlabRays {
             offset: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
             inverse: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
             start: f32x8::splat(simd, get(&self.start, ray)),
@@ -317,9 +317,9 @@ impl Rays {
 
     /// Sixteen rays.
     #[inline(always)]
-    pub(crate) fn sixteen<S: Simd>(&self, simd: S, which: usize) -> Slabs<f32x16<S>> {
+    pub(crate) fn sixteen<S: Simd>(&self, simd: S, which: usize) -> SlabRays<f32x16<S>> {
         let ([a, b, c], [d, e, f]) = (&self.offset, &self.inverse);
-        Slabs {
+        SlabRays {
             offset: [sixteen(simd, a, which), sixteen(simd, b, which), sixteen(simd, c, which)],
             inverse: [sixteen(simd, d, which), sixteen(simd, e, which), sixteen(simd, f, which)],
             start: sixteen(simd, &self.start, which),
