@@ -108,11 +108,11 @@ fn box_of_centers<S: Simd>(simd: S, items: &[Item]) -> f32x8<S> {
     centers
 }
 
-/// Half the surface of a box whose lengths are multiplied by `unit`.
+/// Half the surface of a box whose lengths are multiplied by `length_scale`.
 #[inline(always)]
-fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
+fn area<S: Simd>(simd: S, sides: f32x8<S>, length_scale: f32) -> f32 {
     let (low, high) = sides.split();
-    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, unit)).into();
+    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, length_scale)).into();
     size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
 }
 
@@ -227,7 +227,7 @@ impl Bins {
 
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
-    fn best<S: Simd>(&self, simd: S, rule: &BinScale, unit: f32) -> Option<Split> {
+    fn best<S: Simd>(&self, simd: S, rule: &BinScale, length_scale: f32) -> Option<Split> {
         debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
         let mut best = Split::NONE;
         for (axis, bins) in self.0.iter().enumerate() {
@@ -239,7 +239,7 @@ impl Bins {
             let mut costs = [f32::NAN; MOST_BINS];
             let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
             for (bin, cost) in bins.iter().take(rule.count).zip(&mut costs) {
-                *cost = area(simd, all, unit) * as_factor(sum);
+                *cost = area(simd, all, length_scale) * as_factor(sum);
                 all = all.lesser(f32x8::simd_from(simd, bin.bounds));
                 sum += bin.cost;
             }
@@ -249,7 +249,7 @@ impl Bins {
                 let (Some(bin), Some(before)) = (bins.get(at), costs.get(at)) else { continue };
                 all = all.lesser(f32x8::simd_from(simd, bin.bounds));
                 sum += bin.cost;
-                let cost = before + area(simd, all, unit) * as_factor(sum);
+                let cost = before + area(simd, all, length_scale) * as_factor(sum);
                 best = best.min(Split::new(axis, at, cost));
             }
         }
@@ -264,7 +264,7 @@ pub(crate) struct CutInTwo<'w> {
     /// Bins of an axis, at most.
     pub(crate) most_bins: usize,
     /// The factor that scales lengths before areas are computed from them.
-    pub(crate) unit: f32,
+    pub(crate) length_scale: f32,
     /// Bins that other cuts may have used.
     pub(crate) bins: &'w mut Bins,
 }
@@ -274,13 +274,13 @@ impl Kernel for CutInTwo<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { items, most_bins, unit, bins } = self;
+        let Self { items, most_bins, length_scale, bins } = self;
         // Bin the items by their centres.
         let count = bin_count(items.len()).min(most_bins);
         let rule = BinScale::new(simd, count, box_of_centers(simd, items));
         bins.fill(simd, items, &rule);
         // Find the cheapest cut, and the boxes of its parts.
-        let split = bins.best(simd, &rule, unit)?;
+        let split = bins.best(simd, &rule, length_scale)?;
         let bins = bins.0[split.axis()].get(..rule.count).unwrap_or_default();
         let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
         let (first, second) = parts.unwrap_or_default();
@@ -364,11 +364,15 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(items, bins) = self;
             let centers = box_of_centers(simd, items).into();
-            (centers, CutInTwo { items, most_bins: MOST_BINS, unit: UNIT, bins }.run(simd))
+            (
+                centers,
+                CutInTwo { items, most_bins: MOST_BINS, length_scale: LENGTH_SCALE, bins }
+                    .run(simd),
+            )
         }
     }
 
-    const UNIT: f32 = 0.125;
+    const LENGTH_SCALE: f32 = 0.125;
 
     fn sides_of_item(item: &Item) -> Sides {
         let [x, y, z, _, u, v, w, _] = item.map(f32::from_bits);
@@ -378,7 +382,7 @@ mod tests {
     /// The box of some items, and the cost of entering them.
     fn box_and_cost(items: &[Item]) -> (Sides, f32) {
         let bounds = least(items.iter().map(sides_of_item));
-        let size = |axis: usize| (bounds[axis] + bounds[axis + 4]) * UNIT;
+        let size = |axis: usize| (bounds[axis] + bounds[axis + 4]) * LENGTH_SCALE;
         let (x, y, z) = (size(0), size(1), size(2));
         let cost: u32 = items.iter().map(|item| item[COST]).sum();
         (bounds, (x * y + y * z + z * x) * as_factor(cost))

@@ -63,7 +63,7 @@ impl Parts {
     }
 
     /// Puts two halves, which meet at `middle`, in the place of a part. The parts behind it move up by one.
-    fn replace(&mut self, part: usize, middle: u32, boxes: [Aabb; 2], unit: f32) {
+    fn replace(&mut self, part: usize, middle: u32, boxes: [Aabb; 2], length_scale: f32) {
         for at in (part + 1..=self.count).rev() {
             self.ends[(at + 1) % (WIDTH + 1)] = self.ends[at % (WIDTH + 1)];
             self.boxes[at % WIDTH] = self.boxes[(at - 1) % WIDTH];
@@ -71,7 +71,7 @@ impl Parts {
         }
         self.ends[(part + 1) % (WIDTH + 1)] = middle;
         for (at, bounds) in (part..).zip(boxes) {
-            let [x, y, z] = (bounds.size() * unit).to_array();
+            let [x, y, z] = (bounds.size() * length_scale).to_array();
             self.boxes[at % WIDTH] = bounds;
             self.areas[at % WIDTH] = x * y + y * z + z * x;
         }
@@ -84,15 +84,15 @@ pub(crate) struct Cutter {
     limits: Limits,
     level: SimdLevel,
     /// The factor that scales lengths before areas are computed from them.
-    unit: f32,
+    length_scale: f32,
     bins: Bins,
 }
 
 impl Cutter {
     /// A cutter of items within `bounds`.
     pub(crate) fn new(bounds: &Aabb, limits: Limits) -> Self {
-        let unit = inverse_power(bounds.size().max_element());
-        Self { limits, level: SimdLevel::detect(), unit, bins: Bins::new() }
+        let length_scale = inverse_power(bounds.size().max_element());
+        Self { limits, level: SimdLevel::detect(), length_scale, bins: Bins::new() }
     }
 
     /// Cuts a range into eight parts, or into fewer if all are small. Moves the items, so that each part is a range.
@@ -106,7 +106,7 @@ impl Cutter {
             let items = items.get_mut(range.start as usize..range.end as usize);
             let Some(items) = items.or_bug("a part behind the items") else { break };
             let (count, boxes) = self.cut(items, halve);
-            parts.replace(part, range.start + count, boxes, self.unit);
+            parts.replace(part, range.start + count, boxes, self.length_scale);
         }
         if parts.count == 1 {
             // Only a range that is small from the start is not cut: that of a root over few triangles.
@@ -122,9 +122,9 @@ impl Cutter {
     fn cut(&mut self, items: &mut [Item], halve: bool) -> (u32, [Aabb; 2]) {
         // Two items can be cut in one way only.
         if !halve && items.len() > 2 {
-            let bins = &mut self.bins;
-            let cut =
-                CutInTwo { items: &mut *items, most_bins: self.limits.bins, unit: self.unit, bins };
+            let (most_bins, length_scale) = (self.limits.bins, self.length_scale);
+            let (items, bins) = (&mut *items, &mut self.bins);
+            let cut = CutInTwo { items, most_bins, length_scale, bins };
             if let Some((middle, boxes)) = dispatch(self.level, cut) {
                 return (middle as u32, boxes.map(|sides| corners(&sides)));
             }
