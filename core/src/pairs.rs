@@ -2,7 +2,7 @@
 //! lanes, with the same bits.
 //!
 //! ```text
-//! place   each corner, so that the ray is the z axis
+//! shear   each corner, so that the ray is the z axis
 //! edges   two edge functions of opposite signs: a miss; one that is small beside its products: unsure
 //! depth   the corners' depths, weighted by the edge functions
 //! range   all corners inside the ray's range, or the hit clearly inside: a hit; the hit clearly outside: a miss;
@@ -15,13 +15,13 @@
 //! # Hits clearly inside
 //!
 //! If corners lie on both sides of an end of the range, or at it, the point T where the line meets the triangle's plane
-//! decides exactly (the head of `triangle`). Let S = |U + V + W|, P the largest x or y of a place, D the largest |z|,
+//! decides exactly (the head of `triangle`). Let S = |U + V + W|, P the largest x or y of a corner, D the largest |z|,
 //! Q = P + D, and R the difference between the corners' z. No coordinate of a corner relative to the origin exceeds Q,
-//! because the shear is at most 1. T is the mean of the corners, weighted by the edge functions of places without
-//! error. Let N be how much one of these differs from the computed one.
+//! because the shear is at most 1. T is the mean of the corners, weighted by the edge functions of projections
+//! without error. Let N be how much one of these differs from the computed one.
 //!
 //! ```text
-//! N                places move by 2^-50 Q: 4 * 2^-50 Q^2 and a little; and 2^-41 of the value
+//! N                projections move by 2^-50 Q: 4 * 2^-50 Q^2 and a little; and 2^-41 of the value
 //! 3 N < 2^-21 S    if S >= 2^-24 Q^2: 3 * 4 * 2^-50 * 2^24 < 2^-22
 //! weighted sum     of the corners' distances from the end: changes by at most 3 N R, because no corner is farther
 //!                  than R from the end, so by less than 2^-21 R S
@@ -126,9 +126,9 @@ fn decide_in_line<S: Simd>(
     let [dx, dy, dz] = wide(turn.to_z(direction));
     let (shear_x, shear_y) = (dx / dz, dy / dz);
     let (origin, shear) = ([ox, oy, oz], [shear_x, shear_y]);
-    let a = place(wide(turn.to_z(a)), origin, shear);
-    let b = place(wide(turn.to_z(b)), origin, shear);
-    let c = place(wide(turn.to_z(c)), origin, shear);
+    let a = sheared(wide(turn.to_z(a)), origin, shear);
+    let b = sheared(wide(turn.to_z(b)), origin, shear);
+    let c = sheared(wide(turn.to_z(c)), origin, shear);
 
     // Compute the edge functions; drop lanes that have two of opposite signs.
     let zero = f64x8::splat(simd, 0.0);
@@ -217,7 +217,7 @@ impl<S: Simd> Turn<S> {
 
 /// A corner relative to the ray, sheared so that the ray is the z axis.
 #[inline(always)]
-fn place<S: Simd>(
+fn sheared<S: Simd>(
     [x, y, z]: [f64x8<S>; 3],
     origin: [f64x8<S>; 3],
     shear: [f64x8<S>; 2],
@@ -226,7 +226,7 @@ fn place<S: Simd>(
     [x - shear[0] * z, y - shear[1] * z, z]
 }
 
-/// The larger coordinate of a place across the ray.
+/// The larger coordinate of a sheared corner across the ray.
 #[inline(always)]
 fn widest<S: Simd>([x, y, _]: [f64x8<S>; 3]) -> f64x8<S> {
     x.abs().max(y.abs())

@@ -12,11 +12,11 @@
 //!
 //! # Edges and vertices
 //!
-//! Each corner has one place (x, y), which depends on the ray and the corner alone. On these places
+//! Each corner has one projection (x, y), which depends on the ray and the corner alone. On projections
 //! the signs of U, V and W are exact. A rounded difference of two rounded products has the exact
 //! sign or is 0, as rounding is monotonic; an edge function that is small beside its products is
 //! computed again without rounding ([`difference`]). Triangles that share an edge or a vertex
-//! share its places, and what lies on an edge counts as inside, so no ray slips between them.
+//! share its projections, and what lies on an edge counts as inside, so no ray slips between them.
 //!
 //! # Errors
 //!
@@ -201,7 +201,7 @@ impl TriangleTest {
     /// The hit with this triangle, if its `t` lies in the ray's closed range.
     ///
     /// A function of the ray and the triangle, of nothing else. A triangle of no area, or seen exactly
-    /// edge on, is not hit, up to the rounding of its corners' places.
+    /// edge on, is not hit, up to the rounding of its corners' projections.
     #[inline(always)]
     #[must_use]
     pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {
@@ -262,7 +262,7 @@ impl TriangleTest {
         if is_outside(edges) {
             return None;
         }
-        let is_small = |place: usize| edges[place].abs() <= SMALL * products[place][0].abs();
+        let is_small = |edge: usize| edges[edge].abs() <= SMALL * products[edge][0].abs();
         if is_small(0) || is_small(1) || is_small(2) {
             edges = exact_edges([a, b, c]);
             if is_outside(edges) {
@@ -409,7 +409,7 @@ fn is_outside([u, v, w]: [f64; 3]) -> bool {
     any_negative & any_positive
 }
 
-/// The edge functions of three places, each with its exact sign and an error of a few roundings of itself.
+/// The edge functions of three projections, each with its exact sign and an error of a few roundings of itself.
 #[cold]
 #[inline(never)]
 fn exact_edges([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
@@ -422,7 +422,7 @@ fn exact_edges([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
 
 /// The difference of two products, each of two numbers (Dekker 1971, Knuth 1997).
 ///
-/// Exact but for a last rounding of the sum: nothing overflows, and nothing underflows, as places
+/// Exact but for a last rounding of the sum: nothing overflows, and nothing underflows, as projections
 /// are 0 or larger than 2^-430.
 fn difference(x: [f64; 2], y: [f64; 2]) -> f64 {
     let ([x, x_rest], [y, y_rest]) = (product(x), product(y));
