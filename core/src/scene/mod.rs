@@ -201,8 +201,8 @@ impl<'a> Scene<'a> {
         self.blob
     }
 
-    /// The place of the object that a hit names.
-    fn place(&self, hit: &SceneHit) -> Option<Place<'a>> {
+    /// The path to the object that a hit names.
+    fn path(&self, hit: &SceneHit) -> Option<InstancePath<'a>> {
         let mut instances = [None; MAX_NESTING];
         let mut scene = *self;
         for (level, &number) in hit.path.iter().enumerate() {
@@ -219,7 +219,7 @@ impl<'a> Scene<'a> {
                 Object::Nothing => 0,
             };
             let is_end = hit.path.iter().skip(level + 1).all(|&number| number == INVALID_ID);
-            return (is_end && hit.primitive < count).then_some(Place { instances, object });
+            return (is_end && hit.primitive < count).then_some(InstancePath { instances, object });
         }
         None
     }
@@ -229,7 +229,7 @@ impl<'a> Scene<'a> {
     /// the end must be [`INVALID_ID`].
     #[must_use]
     pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
-        self.place(hit)?.instances().next_back()?.instance()
+        self.path(hit)?.instances().next_back()?.instance()
     }
 
     /// The instance at a level of the path of a hit: 0 is that of the outermost scene, and
@@ -237,14 +237,14 @@ impl<'a> Scene<'a> {
     /// level.
     #[must_use]
     pub fn instance_at(&self, hit: &SceneHit, level: usize) -> Option<Instance> {
-        self.place(hit)?.instances().nth(level)?.instance()
+        self.path(hit)?.instances().nth(level)?.instance()
     }
 
     /// The object that a hit names: the grid or the shapes at the end of its path. `None` as for
     /// [`instance_of`](Self::instance_of).
     #[must_use]
     pub fn object_of(&self, hit: &SceneHit) -> Option<Object<'a>> {
-        Some(*self.place(hit)?.object)
+        Some(*self.path(hit)?.object)
     }
 
     /// Takes a normal, of any length, from the space of the object that a hit names to the scene's; the result has
@@ -252,7 +252,7 @@ impl<'a> Scene<'a> {
     #[must_use]
     pub fn normal_of(&self, hit: &SceneHit, normal: [f32; 3]) -> Option<[f32; 3]> {
         let normal = DVec3::from_array(normal.map(f64::from));
-        Some(self.place(hit)?.normal(normal)?.to_array().map(round))
+        Some(self.path(hit)?.normal(normal)?.to_array().map(round))
     }
 
     /// The normal of the triangle that was hit, of length 1, in the scene's space, on the side that is the front in
@@ -268,12 +268,12 @@ impl<'a> Scene<'a> {
 }
 
 /// An object, and the instances on the way to it.
-struct Place<'a> {
+struct InstancePath<'a> {
     instances: [Option<&'a StoredInstance>; MAX_NESTING],
     object: &'a Object<'a>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> InstancePath<'a> {
     /// The instances from that of the outermost scene on.
     fn instances(&self) -> impl DoubleEndedIterator<Item = &'a StoredInstance> {
         self.instances.into_iter().flatten()

@@ -15,7 +15,7 @@
 use glam::DVec3;
 
 use super::instance::StoredInstance;
-use super::{Object, Place, Scene, SceneHit};
+use super::{InstancePath, Object, Scene, SceneHit};
 use crate::approach::LineF64;
 use crate::ray::{Hit, RayF64, round};
 use crate::surface::Facet;
@@ -62,24 +62,24 @@ impl Scene<'_> {
     /// ```
     #[must_use]
     pub fn surface(&self, ray: &RayF64, hit: &SceneHit) -> Option<SceneSurface> {
-        let place = self.place(hit)?;
-        let Object::Grid(grid) = place.object else { return None };
-        let along = DVec3::from_array(place.line(&LineF64::from(ray)).direction);
+        let path = self.path(hit)?;
+        let Object::Grid(grid) = path.object else { return None };
+        let along = DVec3::from_array(path.line(&LineF64::from(ray)).direction);
         let SceneHit { t, u, v, primitive, .. } = *hit;
         let facet = Facet::new(grid.mesh(), along, &Hit { t, u, v, primitive })?;
         let (min, max) = grid.bounds();
         let extent = (0..3).map(|axis| f64::from(max[axis] - min[axis])).fold(0.0, f64::max);
         Some(SceneSurface {
-            position: place.to_scene(facet.point)?.to_array(),
-            above: place.start(&facet, 1.0, extent)?.to_array(),
-            below: place.start(&facet, -1.0, extent)?.to_array(),
-            normal: place.normal(facet.normal)?.to_array().map(round),
+            position: path.to_scene(facet.point)?.to_array(),
+            above: path.start(&facet, 1.0, extent)?.to_array(),
+            below: path.start(&facet, -1.0, extent)?.to_array(),
+            normal: path.normal(facet.normal)?.to_array().map(round),
             is_front: facet.is_front.into(),
         })
     }
 }
 
-impl Place<'_> {
+impl InstancePath<'_> {
     /// A line of the scene as the object sees it.
     fn line(&self, line: &LineF64) -> LineF64 {
         self.instances().fold(*line, |line, instance| instance.line(&line))
