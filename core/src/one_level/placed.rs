@@ -12,7 +12,7 @@ use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
 
-/// Primitives, numbered by their places, and the cells to which each belongs. Lists hold places.
+/// Primitives, by number, and the cells to which each belongs. Lists hold the numbers.
 ///
 /// The passes take a trait object, so that their code is compiled once for all that is spread. They call `place` once
 /// a batch, and `range` only for primitives that it did not place.
@@ -20,18 +20,18 @@ pub(crate) trait Spread {
     /// Cells per axis.
     fn resolution(&self) -> [u32; 3];
 
-    /// Number of places where a primitive may be.
+    /// How many numbers there are. Some primitives may have no cells.
     fn count(&self) -> u32;
 
-    /// The cells of the primitive at a place, if it has any. Every call answers the same.
-    fn range(&self, place: u32) -> Option<CellRange>;
+    /// The cells of a primitive, if it has any. Every call answers the same.
+    fn range(&self, number: u32) -> Option<CellRange>;
 
-    /// Notes in a batch the cells of the primitives at some places, no more than the batch holds: those that
+    /// Notes in a batch the cells of some primitives, no more than the batch holds: those that
     /// [`range`](Self::range) finds. It may leave out primitives, whose bits in `is_placed` stay 0.
-    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch);
+    fn place(&self, numbers: Range<u32>, batch: &mut PlacedBatch);
 }
 
-/// The cells of a primitive: the row and the place in it of the first, and how many more there are on each axis.
+/// The cells of a primitive: the row and the x of the first, and how many more there are on each axis.
 #[derive(Debug, Clone, Copy)]
 struct CellSpan {
     row: usize,
@@ -75,7 +75,7 @@ pub(crate) struct PlacedBatch {
     pub(super) is_placed: u64,
 }
 
-/// Progress is reported only at the first place of a batch.
+/// Progress is reported only at the first primitive of a batch.
 const _: () = assert!(OFTEN.is_multiple_of(PlacedBatch::SIZE));
 
 impl PlacedBatch {
@@ -107,9 +107,9 @@ impl PlacedBatch {
         for done in (0..count).step_by(Self::SIZE as usize) {
             watch.step(done, count, share)?;
             let first = if REVERSE { (count - 1 - done) / Self::SIZE * Self::SIZE } else { done };
-            let places = first..count.min(first.saturating_add(Self::SIZE));
-            spread.place(places.clone(), &mut batch);
-            if !visit(&batch, places) {
+            let numbers = first..count.min(first.saturating_add(Self::SIZE));
+            spread.place(numbers.clone(), &mut batch);
+            if !visit(&batch, numbers) {
                 return Ok(false);
             }
         }
@@ -118,33 +118,33 @@ impl PlacedBatch {
 
     /// The number of cells that primitives are in.
     #[inline(always)]
-    pub(super) fn references(&self, spread: &dyn Spread, places: Range<u32>) -> u64 {
-        let cells = |(lane, place)| match self.get(lane) {
+    pub(super) fn references(&self, spread: &dyn Spread, numbers: Range<u32>) -> u64 {
+        let cells = |(lane, number)| match self.get(lane) {
             Some(placed) => placed.count(),
-            None => spread.range(place).map_or(0, |range| range.count()),
+            None => spread.range(number).map_or(0, |range| range.count()),
         };
-        places.enumerate().map(cells).sum()
+        numbers.enumerate().map(cells).sum()
     }
 
-    /// Shows `visit` the rows of cells that primitives are in: the place of the primitive, the row,
+    /// Shows `visit` the rows of cells that primitives are in: the number of the primitive, the row,
     /// its first cell there and the number of cells.
     #[inline(always)]
     pub(super) fn each_row<const REVERSE: bool>(
         &self,
         spread: &dyn Spread,
-        places: Range<u32>,
+        numbers: Range<u32>,
         mut visit: impl FnMut(u32, usize, u32, u32),
     ) {
         let [_, height, _] = spread.resolution();
-        let (first, count) = (places.start, places.end - places.start);
+        let (first, count) = (numbers.start, numbers.end - numbers.start);
         for at in 0..count {
             let lane = if REVERSE { count - 1 - at } else { at };
-            let place = first + lane;
+            let number = first + lane;
             let Some(placed) = self.get(lane as usize) else {
-                let Some(CellRange { min, max }) = spread.range(place) else { continue };
+                let Some(CellRange { min, max }) = spread.range(number) else { continue };
                 for z in min[2]..=max[2] {
                     for y in min[1]..=max[1] {
-                        visit(place, row(height, y, z), min[0], max[0] - min[0] + 1);
+                        visit(number, row(height, y, z), min[0], max[0] - min[0] + 1);
                     }
                 }
                 continue;
@@ -152,7 +152,7 @@ impl PlacedBatch {
             let (row, x, height) = (placed.row, placed.x, height as usize);
             let mut show = |behind: &[usize], length: u32| {
                 for behind in behind {
-                    visit(place, row + behind, x, length);
+                    visit(number, row + behind, x, length);
                 }
             };
             // Common shapes need no loops.
@@ -187,13 +187,13 @@ impl PlacedBatch {
 
     /// Places one primitive after the other.
     #[inline(always)]
-    pub(crate) fn place_each(&mut self, spread: &impl Spread, places: Range<u32>) {
+    pub(crate) fn place_each(&mut self, spread: &impl Spread, numbers: Range<u32>) {
         let [_, height, _] = spread.resolution();
         self.is_placed = 0;
         let xs_and_more = self.xs.as_flattened_mut().iter_mut().zip(self.more.as_flattened_mut());
         let slots = self.rows.as_flattened_mut().iter_mut().zip(xs_and_more);
-        for ((lane, place), (row, (x, more))) in places.enumerate().zip(slots) {
-            let Some(CellRange { min, max }) = spread.range(place) else { continue };
+        for ((lane, number), (row, (x, more))) in numbers.enumerate().zip(slots) {
+            let Some(CellRange { min, max }) = spread.range(number) else { continue };
             let [wide, high, deep] = core::array::from_fn(|axis| max[axis] - min[axis]);
             (*row, *x) = (min[2] * height + min[1], min[0]);
             *more = wide | high << MORE_BITS | deep << (2 * MORE_BITS);

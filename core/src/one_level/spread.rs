@@ -29,8 +29,8 @@ pub(crate) fn mark(
 ) -> Result<Option<u32>, Error> {
     domain_bits.fill(0);
     let [width, ..] = spread.resolution();
-    count_references(spread, limit, watch, |batch, places| {
-        batch.each_row::<false>(spread, places, |_, row, x, length| {
+    count_references(spread, limit, watch, |batch, numbers| {
+        batch.each_row::<false>(spread, numbers, |_, row, x, length| {
             set_range(domain_bits, row * width as usize + x as usize, length as usize - 1);
         });
     })
@@ -45,11 +45,11 @@ pub(crate) fn count_references(
     mut visit: impl FnMut(&PlacedBatch, Range<u32>),
 ) -> Result<Option<u32>, Error> {
     let mut count = 0;
-    let is_all = PlacedBatch::each::<false>(spread, watch, [0.15, 0.4], |batch, places| {
-        count += batch.references(spread, places.clone());
+    let is_all = PlacedBatch::each::<false>(spread, watch, [0.15, 0.4], |batch, numbers| {
+        count += batch.references(spread, numbers.clone());
         let goes_on = count <= u64::from(limit);
         if goes_on {
-            visit(batch, places);
+            visit(batch, numbers);
         }
         goes_on
     })?;
@@ -66,8 +66,8 @@ pub(crate) fn fill(
 ) -> Result<(), Error> {
     // Count the references of each slot.
     hash.fill(0);
-    PlacedBatch::each::<false>(spread, watch, [0.5, 0.7], |batch, places| {
-        batch.each_row::<false>(spread, places, |_, row, x, length| {
+    PlacedBatch::each::<false>(spread, watch, [0.5, 0.7], |batch, numbers| {
+        batch.each_row::<false>(spread, numbers, |_, row, x, length| {
             for count in slots(row_offsets, hash, row, x, length) {
                 *count += 1;
             }
@@ -84,13 +84,13 @@ pub(crate) fn fill(
     debug_assert!(end as usize == references.len(), "not as many references as were counted");
 
     // Put every primitive before the end of its lists, the last one first: lists ascend.
-    PlacedBatch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {
-        batch.each_row::<true>(spread, places, |place, row, x, length| {
+    PlacedBatch::each::<true>(spread, watch, [0.7, 1.0], |batch, numbers| {
+        batch.each_row::<true>(spread, numbers, |number, row, x, length| {
             for end in slots(row_offsets, hash, row, x, length) {
                 *end = end.wrapping_sub(1);
                 let reference = references.get_mut(*end as usize);
                 if let Some(reference) = reference.or_bug("a cell has too many references") {
-                    *reference = place;
+                    *reference = number;
                 }
             }
         });
@@ -139,12 +139,12 @@ mod tests {
             u32::try_from(self.ranges.len()).unwrap()
         }
 
-        fn range(&self, place: u32) -> Option<CellRange> {
-            self.ranges[place as usize]
+        fn range(&self, number: u32) -> Option<CellRange> {
+            self.ranges[number as usize]
         }
 
-        fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
-            batch.place_each(self, places);
+        fn place(&self, numbers: Range<u32>, batch: &mut PlacedBatch) {
+            batch.place_each(self, numbers);
         }
     }
 
@@ -153,13 +153,13 @@ mod tests {
         let mut state = 1_u32;
         let mut below = |end: u32| (random::next(&mut state) >> 8) % end;
         let mut ranges = Vec::new();
-        for place in 0..count {
+        for number in 0..count {
             let min: [u32; 3] = resolution.map(&mut below);
             let most = below(4) + 1;
             let max =
                 core::array::from_fn(|axis| (min[axis] + below(most)).min(resolution[axis] - 1));
             let all = CellRange { min: [0; 3], max: [resolution[0] - 1, 0, 0] };
-            ranges.push(match place % 50 {
+            ranges.push(match number % 50 {
                 7 => None,
                 49 => Some(all),
                 _ => Some(CellRange { min, max }),
@@ -177,10 +177,10 @@ mod tests {
                 let spread = written(count, resolution);
                 let [width, height, depth] = resolution.map(|cells| cells as usize);
                 let mut expected = vec![Vec::new(); width * height * depth];
-                for (place, range) in (0..).zip(&spread.ranges) {
+                for (number, range) in (0..).zip(&spread.ranges) {
                     for [x, y, z] in range.iter().flat_map(|range| range.cells()) {
                         let cell = row(resolution[1], y, z) * width + x as usize;
-                        expected[cell].push(place);
+                        expected[cell].push(number);
                     }
                 }
                 let sum: usize = expected.iter().map(Vec::len).sum();

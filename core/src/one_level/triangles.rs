@@ -45,13 +45,13 @@ impl Spread for MeshSpread<'_> {
     }
 
     #[inline(always)]
-    fn range(&self, place: u32) -> Option<CellRange> {
-        let bounds = self.mesh.corners(place).and_then(Aabb::of)?;
+    fn range(&self, number: u32) -> Option<CellRange> {
+        let bounds = self.mesh.corners(number).and_then(Aabb::of)?;
         Some(self.lattice.range(&bounds))
     }
 
-    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
-        let (wide, first) = (self.wide, places.start);
+    fn place(&self, numbers: Range<u32>, batch: &mut PlacedBatch) {
+        let (wide, first) = (self.wide, numbers.start);
         // In a joined mesh, read the part of the first triangle; triangles of others are placed one by one.
         let (wide, first) = if self.mesh.parts().is_empty() {
             (wide, first)
@@ -61,7 +61,7 @@ impl Spread for MeshSpread<'_> {
         if HAS_VECTORS && !wide.is_empty() {
             dispatch(SimdLevel::detect(), PlaceBatch { spread: self, wide, first, batch });
         } else {
-            batch.place_each(self, places);
+            batch.place_each(self, numbers);
         }
     }
 }
@@ -114,13 +114,13 @@ mod tests {
     fn rows(
         batch: &PlacedBatch,
         spread: &MeshSpread<'_>,
-        places: Range<u32>,
+        numbers: Range<u32>,
     ) -> (Vec<[usize; 4]>, u64) {
         let mut rows = Vec::new();
-        batch.each_row::<false>(spread, places.clone(), |place, row, x, length| {
-            rows.push([place as usize, row, x as usize, length as usize]);
+        batch.each_row::<false>(spread, numbers.clone(), |number, row, x, length| {
+            rows.push([number as usize, row, x as usize, length as usize]);
         });
-        (rows, batch.references(spread, places))
+        (rows, batch.references(spread, numbers))
     }
 
     #[test]
@@ -151,10 +151,10 @@ mod tests {
                 let mesh = TriangleMesh::new(&positions, &indices[..count]).unwrap();
                 let spread = MeshSpread::new(&mesh, &lattice);
                 for first in (0..spread.count()).step_by(64) {
-                    let places = first..spread.count().min(first + 64);
+                    let numbers = first..spread.count().min(first + 64);
                     let (mut expected, mut cells) = (Vec::new(), 0);
-                    for place in places.clone() {
-                        let Some(range) = spread.range(place) else { continue };
+                    for number in numbers.clone() {
+                        let Some(range) = spread.range(number) else { continue };
                         let CellRange { min, max } = range;
                         cells += range.count();
                         for z in min[2]..=max[2] {
@@ -162,7 +162,7 @@ mod tests {
                                 let length = max[0] - min[0] + 1;
                                 let [x, length] = [min[0], length].map(|cells| cells as usize);
                                 expected.push([
-                                    place as usize,
+                                    number as usize,
                                     row(resolution[1], y, z),
                                     x,
                                     length,
@@ -173,8 +173,8 @@ mod tests {
                     let expected = (expected, cells);
 
                     let mut batch = PlacedBatch::empty();
-                    batch.place_each(&spread, places.clone());
-                    assert_eq!(rows(&batch, &spread, places.clone()), expected);
+                    batch.place_each(&spread, numbers.clone());
+                    assert_eq!(rows(&batch, &spread, numbers.clone()), expected);
                     // Machines without vectors never run this kernel.
                     if !HAS_VECTORS {
                         continue;
@@ -189,7 +189,7 @@ mod tests {
                                 batch: &mut batch,
                             },
                         );
-                        assert_eq!(rows(&batch, &spread, places.clone()), expected, "{level:?}");
+                        assert_eq!(rows(&batch, &spread, numbers.clone()), expected, "{level:?}");
                     }
                     let placed = batch.is_placed.count_ones();
                     let is_expected = if count > 1 && first == 0 { 40..=62 } else { 0..=1 };

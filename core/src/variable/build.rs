@@ -57,13 +57,13 @@ impl Spread for CellSpread<'_> {
     }
 
     #[inline(always)]
-    fn range(&self, place: u32) -> Option<CellRange> {
-        let id = *self.ids.get(place as usize).or_bug("a place behind the list")?;
+    fn range(&self, number: u32) -> Option<CellRange> {
+        let id = *self.ids.get(number as usize).or_bug("a number behind the list")?;
         Some(self.frame.range(self.cell, &self.reach(id)?))
     }
 
-    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
-        batch.place_each(self, places);
+    fn place(&self, numbers: Range<u32>, batch: &mut PlacedBatch) {
+        batch.place_each(self, numbers);
     }
 }
 
@@ -322,10 +322,10 @@ impl CellSpread<'_> {
         if filled.is_err() {
             return false;
         }
-        // The lists hold places in the cell's list: replace them by its ids, which ascend as well.
+        // The lists hold indices into the cell's list: replace them by its ids, which ascend as well.
         for reference in sections.references {
             let id = self.ids.get(*reference as usize).copied();
-            *reference = id.or_bug("a place behind the list").unwrap_or(u32::MAX);
+            *reference = id.or_bug("a number behind the list").unwrap_or(u32::MAX);
         }
         true
     }
