@@ -1,6 +1,6 @@
 //! Up to 64 rays through the tree together.
 //!
-//! Each place on the stack has a child and the rays that met its box, one bit each. So a node is decoded and
+//! Each entry on the stack has a child and the rays that met its box, one bit each. So a node is decoded and
 //! a leaf's triangles are fetched once for all of them, and a ray is tested only below boxes that it met.
 //!
 //! ```text
@@ -200,8 +200,8 @@ impl<L: Leaves> Descent<'_, '_, L> {
                         let slot = slots.trailing_zeros();
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
-                        let place = number << 3 | slot;
-                        push::<L>(stack, &mut top, base, GroupEntry { place, near, rays });
+                        let node_and_slot = number << 3 | slot;
+                        push::<L>(stack, &mut top, base, GroupEntry { node_and_slot, near, rays });
                         if is_large {
                             bvh.prefetch(node.child(slot));
                         }
@@ -223,7 +223,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
                     mask = rays.ending_behind(simd, waiting.near, mask);
                 }
                 if mask != 0 {
-                    let (node, slot) = (waiting.place >> 3, waiting.place & 7);
+                    let (node, slot) = (waiting.node_and_slot >> 3, waiting.node_and_slot & 7);
                     let node = bvh.nodes.get(node as usize);
                     child = node.map_or(Child::NONE, |node| node.child(slot));
                     break;

@@ -90,8 +90,8 @@ pub(super) fn pop(bvh: &Bvh<'_>, stack: &[StackEntry], top: &mut usize, end: f32
 #[repr(C)]
 #[derive(Clone, Copy, FromBytes, IntoBytes)]
 pub(super) struct GroupEntry {
-    /// Node and slot.
-    pub(super) place: u32,
+    /// The number of the node, and three bits for the slot.
+    pub(super) node_and_slot: u32,
     /// The least distance at which one of the rays enters; any number if children may come in any order.
     pub(super) near: f32,
     pub(super) rays: u64,
