@@ -28,7 +28,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 use super::node::{Node, WIDTH};
 use crate::aabb::Aabb;
 
-/// The bit of [`Node::first`] that says that a node has fine sides; the other bits are their number. No place of an id
+/// The bit of [`Node::first`] that says that a node has fine sides; the other bits are their index. No index of an id
 /// has it, as there are at most 2^31 ids.
 const HAS_FINE: u32 = 1 << 31;
 
@@ -96,8 +96,8 @@ impl<'f> FineList<'f> {
                 sides.set(node, slot, &[x, y, z, -u, -v, -w]);
             }
             #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
-            let place = self.count as u32;
-            node.first = HAS_FINE | place;
+            let index = self.count as u32;
+            node.first = HAS_FINE | index;
             self.count += 1;
         }
     }
@@ -161,9 +161,9 @@ impl FineSides {
 }
 
 impl Node {
-    /// The place of the node's fine sides in the list, or one behind the end of any list if it has none.
+    /// The index of the node's fine sides in the list, or one behind the end of any list if it has none.
     #[inline(always)]
-    pub(crate) const fn fine_place(&self) -> usize {
+    pub(crate) const fn fine_index(&self) -> usize {
         // Without the bit, the number is 2^31 or more.
         (self.first ^ HAS_FINE) as usize
     }

@@ -206,7 +206,7 @@ impl<'a> Bvh<'a> {
     /// The fine sides of a node, if it has some.
     #[inline(always)]
     fn fine_sides(&self, node: &Node) -> Option<&'a FineSides> {
-        self.fine.get(node.fine_place())
+        self.fine.get(node.fine_index())
     }
 
     /// Passes all leaves to a visitor; `false` if its budget is used up.

@@ -259,7 +259,7 @@ impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
             }
             cost.add(simd, node, level.number == 0);
             thinnest = lesser(thinnest, lesser(-(x + u), lesser(-(y + v), -(z + w))));
-            if let Some(sides) = fine.get_mut(node.fine_place()) {
+            if let Some(sides) = fine.get_mut(node.fine_index()) {
                 for (slot, exact) in level.boxes.iter().enumerate() {
                     if node.inner() >> slot & 1 == 1 {
                         sides.set(node, slot, exact);
