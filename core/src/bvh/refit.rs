@@ -244,8 +244,8 @@ impl<const N: usize> Kernel for RefitNodes<'_, '_, N> {
                     let [x, y, z, u, v, w] = level.boxes[slot];
                     *child = f32x8::simd_from(simd, [x, y, z, 0.0, u, v, w, 0.0]);
                 } else if let Some(last) = count.checked_sub(1) {
-                    for place in 0..LEAF {
-                        let sides = boxes.get(first + place.min(last)).copied();
+                    for lane in 0..LEAF {
+                        let sides = boxes.get(first + lane.min(last)).copied();
                         let sides = sides.or_bug("a child without a box").unwrap_or([0.0; 8]);
                         *child = child.lesser(f32x8::simd_from(simd, sides));
                     }

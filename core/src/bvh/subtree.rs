@@ -279,9 +279,9 @@ impl Subtree {
             if count > LEAF {
                 debug_assert!(self.count < MOST_NODES, "a subtree has too many nodes");
                 let next = self.count;
-                let places = (self.ranges.get_mut(next), self.above.get_mut(next));
+                let slots = (self.ranges.get_mut(next), self.above.get_mut(next));
                 if let ((Some(range_of), Some(above_of)), Some(top_of)) =
-                    (places, self.tops.get_mut(next))
+                    (slots, self.tops.get_mut(next))
                 {
                     (*range_of, *above_of, *top_of) = (*part, above + 1, top);
                     node.set_inner(slot);
@@ -311,7 +311,7 @@ impl Subtree {
 
     /// Finds the boxes of a node's children, and its own, and names ids and nodes by where they lie in the index.
     #[inline(always)]
-    fn quantise<S: Simd>(&mut self, simd: S, at: usize, places: [u32; 2], least: f32) {
+    fn quantise<S: Simd>(&mut self, simd: S, at: usize, starts: [u32; 2], least: f32) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(node), Some(parts)) = (self.nodes.get_mut(at), self.children.get(at)) else {
             return;
@@ -330,8 +330,8 @@ impl Subtree {
             let is_node = count > LEAF;
             let (first, last) = if is_node { (OF_NODES + child, 0) } else { (start, count - 1) };
             child += usize::from(is_node);
-            for place in 0..LEAF {
-                let of_one = self.boxes.get(first + place.min(last)).copied();
+            for lane in 0..LEAF {
+                let of_one = self.boxes.get(first + lane.min(last)).copied();
                 debug_assert!(of_one.is_some(), "a child without a box");
                 *sides = sides.lesser(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
             }
@@ -348,8 +348,8 @@ impl Subtree {
             }
             node.set_boxes(&corners(&bounds.into()), &children, least);
         }
-        node.first += places[0];
-        node.child = (node.child + places[1]).wrapping_sub(1);
+        node.first += starts[0];
+        node.child = (node.child + starts[1]).wrapping_sub(1);
         if let Some(slot) = self.boxes.get_mut(OF_NODES + at) {
             *slot = bounds.into();
         }
