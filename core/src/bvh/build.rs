@@ -342,7 +342,7 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
             child,
             counts,
             subtree: &mut Subtree::new(),
-            level: SimdLevel::detect(),
+            simd_level: SimdLevel::detect(),
             node_count: 0,
             root_count: 0,
             last: RootRecord::new_zeroed(),

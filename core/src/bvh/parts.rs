@@ -82,7 +82,7 @@ impl Parts {
 /// Cuts ranges into parts.
 pub(crate) struct Cutter {
     limits: Limits,
-    level: SimdLevel,
+    simd_level: SimdLevel,
     /// The factor that scales lengths before areas are computed from them.
     length_scale: f32,
     bins: Bins,
@@ -92,7 +92,7 @@ impl Cutter {
     /// A cutter of items within `bounds`.
     pub(crate) fn new(bounds: &Aabb, limits: Limits) -> Self {
         let length_scale = inverse_power(bounds.size().max_element());
-        Self { limits, level: SimdLevel::detect(), length_scale, bins: Bins::new() }
+        Self { limits, simd_level: SimdLevel::detect(), length_scale, bins: Bins::new() }
     }
 
     /// Cuts a range into eight parts, or into fewer if all are small. Moves the items, so that each part is a range.
@@ -125,7 +125,7 @@ impl Cutter {
             let (most_bins, length_scale) = (self.limits.bins, self.length_scale);
             let (items, bins) = (&mut *items, &mut self.bins);
             let cut = CutInTwo { items, most_bins, length_scale, bins };
-            if let Some((middle, boxes)) = dispatch(self.level, cut) {
+            if let Some((middle, boxes)) = dispatch(self.simd_level, cut) {
                 return (middle as u32, boxes.map(|sides| corners(&sides)));
             }
         }

@@ -40,10 +40,10 @@ use crate::survey::Survey;
 pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2], Error> {
     let mut header = Header::read(blob, mesh)?;
     check_mesh(&header, mesh)?;
-    let level = SimdLevel::detect();
+    let simd_level = SimdLevel::detect();
     let bvh = Bvh::open(&header, blob)?;
     bvh.check_ids(&header, mesh)?;
-    let (levels, before) = dispatch(level, CheckNodes(&bvh))?;
+    let (levels, before) = dispatch(simd_level, CheckNodes(&bvh))?;
     let bounds = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
     let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
         let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
@@ -52,13 +52,13 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     });
     let (ids, nodes, fine) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
     let mut tree = Tree { mesh, ids, nodes, fine, least: least_node(&bounds) };
-    let mut refitted = tree.refit(level, levels);
+    let mut refitted = tree.refit(simd_level, levels);
     let bounds = Lattice::pad(&refitted.bounds);
     // Vertices that no triangle uses count for nothing in a build. If they made a step larger, start anew.
     let least = least_node(&bounds);
     if least < tree.least && refitted.thinnest < tree.least {
         tree.least = least;
-        refitted = tree.refit(level, levels);
+        refitted = tree.refit(simd_level, levels);
     }
     debug_assert!(Lattice::pad(&refitted.bounds) == bounds, "the box of all triangles changed");
     (header.bounds_min, header.bounds_max) = (bounds.min.to_array(), bounds.max.to_array());
@@ -168,11 +168,11 @@ struct Refitted {
 
 impl Tree<'_> {
     /// Writes the boxes of all nodes, of which there are so many levels.
-    fn refit(&mut self, level: SimdLevel, levels: u32) -> Refitted {
+    fn refit(&mut self, simd_level: SimdLevel, levels: u32) -> Refitted {
         if levels <= FEW_LEVELS {
-            dispatch(level, RefitNodes::<{ FEW_LEVELS as usize }>(self))
+            dispatch(simd_level, RefitNodes::<{ FEW_LEVELS as usize }>(self))
         } else {
-            dispatch(level, RefitNodes::<{ LEVELS as usize }>(self))
+            dispatch(simd_level, RefitNodes::<{ LEVELS as usize }>(self))
         }
     }
 }

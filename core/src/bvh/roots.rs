@@ -96,7 +96,7 @@ pub(crate) struct Roots<'w> {
     /// Counters for bins: one for each bin of the tree, and a division never has more bins.
     pub(super) counts: &'w mut [u32],
     pub(super) subtree: &'w mut Subtree,
-    pub(super) level: SimdLevel,
+    pub(super) simd_level: SimdLevel,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
@@ -129,7 +129,7 @@ impl Roots<'_> {
             let (Some(entries), Some(spare)) = (entries, spare) else { return };
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
-            sort(self.level, entries, spare, (32 - differing.leading_zeros()).max(shift));
+            sort(self.simd_level, entries, spare, (32 - differing.leading_zeros()).max(shift));
         }
         self.cut(range);
     }
@@ -183,7 +183,7 @@ impl Roots<'_> {
         // Make the subtree, and copy its ids and nodes to the index.
         let subtree = &mut *self.subtree;
         let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
-        dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
+        dispatch(self.simd_level, Build { subtree, mesh, entries, first, child, least, by });
         // Too little room for ids and nodes is legal: they are counted.
         copy_what_fits(self.subtree.ids(), self.ids.get_mut(range.clone()));
 
@@ -235,13 +235,13 @@ impl Roots<'_> {
         let shift = KEY_BITS - bits;
 
         // Find new keys, and count those of each bin.
-        let level = self.level;
+        let simd_level = self.simd_level;
         let (parts, counts) = self.crowd(&range);
         let counts = counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
         let Some(counts) = counts else { return };
         counts.fill(0);
         for part in parts {
-            dispatch(level, NewKeys { part, rule, shift, counts: &mut *counts });
+            dispatch(simd_level, NewKeys { part, rule, shift, counts: &mut *counts });
         }
 
         // Sort the entries by their bins, crowded bins first.
