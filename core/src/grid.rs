@@ -245,34 +245,34 @@ impl<'a> Grid<'a> {
     #[inline(always)]
     fn one(&self, ray: &Ray, until: f32, is_any: bool) -> Option<Hit> {
         let mut one = One { hit: Hit { t: until, ..Hit::MISS }, is_any };
-        let part = [ray.t_min, until];
+        let interval = [ray.t_min, until];
         by_kind!(
             &self.structure,
-            tree => tree.search(&self.scope(), ray, part, Cull::None, &mut one, &mut ()),
+            tree => tree.search(&self.scope(), ray, interval, Cull::None, &mut one, &mut ()),
             {
                 // Save 10 KB: use the traversal of cells for queries with options, so that there is only that one.
                 let mut show = TriangleSearch(&mut |hit| one.show(hit));
-                self.search_cells(ray, part, Cull::None, &mut show, &mut Counters::default());
+                self.search_cells(ray, interval, Cull::None, &mut show, &mut Counters::default());
             }
         );
         (one.hit.primitive != INVALID_ID).then_some(one.hit)
     }
 
-    /// Traverses the structure along a ray and passes the hits to a search: all whose `t` lies in a part of the ray's
+    /// Traverses the structure along a ray and passes the hits to a search: all whose `t` lies in an interval of its
     /// range, and perhaps others. The ray's own range decides what it hits.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
         ray: &Ray,
-        part: [f32; 2],
+        interval: [f32; 2],
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
         by_kind!(
             &self.structure,
-            tree => tree.search(&self.scope(), ray, part, cull, search, tally),
-            self.search_cells(ray, part, cull, search, tally)
+            tree => tree.search(&self.scope(), ray, interval, cull, search, tally),
+            self.search_cells(ray, interval, cull, search, tally)
         );
     }
 
@@ -291,9 +291,9 @@ impl<'a> Grid<'a> {
         if approach.is_remote {
             return test_all(&self.mesh, &test, search, tally);
         }
-        // The test keeps the ray's own range, so that a hit does not depend on the part that is walked.
-        let part = Ray { t_min, t_max, ..*ray };
-        let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
+        // The test keeps the ray's own range, so that a hit does not depend on the interval that is walked.
+        let shortened = Ray { t_min, t_max, ..*ray };
+        let Some(line) = Line::new(&self.lattice, &shortened, &approach) else { return };
         self.traverse(&line, &test, search, tally);
     }
 

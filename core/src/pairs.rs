@@ -16,9 +16,9 @@
 //!
 //! If corners lie on both sides of an end of the range, or at it, the point T where the line meets the triangle's plane
 //! decides exactly (the head of `triangle`). Let S = |U + V + W|, P the largest x or y of a projection, D the largest
-//! |z|, Q = P + D, and R the difference between the corners' z. No coordinate of a corner relative to the origin exceeds
-//! Q, because the shear is at most 1. T is the mean of the corners, weighted by the edge functions of projections
-//! without error. Let N be how much one of these differs from the computed one.
+//! |z|, Q = P + D, and R the difference between the corners' z. No coordinate of a corner relative to the origin is
+//! larger than Q, because the shear is at most 1. T is the mean of the corners, weighted by the edge functions of
+//! projections without error. Let N be how much one of these differs from the computed one.
 //!
 //! ```text
 //! N                projections move by 2^-50 Q: 4 * 2^-50 Q^2 and a little; and 2^-41 of the value

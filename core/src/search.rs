@@ -300,8 +300,8 @@ mod tests {
                 let ray = &Ray::new(point(&mut state).to_array(), point(&mut state).to_array());
                 let [closest, any] = [false, true].map(|is_any| {
                     let mut one = One { hit: Hit { t: ray.t_max, ..Hit::MISS }, is_any };
-                    let (mut work, part) = (Counters::default(), [ray.t_min, ray.t_max]);
-                    grid.search(ray, part, Cull::None, &mut one, &mut work);
+                    let (mut work, interval) = (Counters::default(), [ray.t_min, ray.t_max]);
+                    grid.search(ray, interval, Cull::None, &mut one, &mut work);
                     (one.hit.primitive != INVALID_ID, work)
                 });
                 let mut counted = Counters::default();

@@ -37,12 +37,12 @@ impl Bvh<'_> {
         &self,
         scope: &Scope<'_>,
         ray: &Ray,
-        part: [f32; 2],
+        interval: [f32; 2],
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
-        if self.walk(scope, ray, part, cull, None, search, tally) {
+        if self.walk(scope, ray, interval, cull, None, search, tally) {
             return;
         }
         let Some(approach) = Approach::new(ray, &scope.bounds) else { return };
@@ -50,8 +50,8 @@ impl Bvh<'_> {
         if approach.is_remote {
             return test_all(scope.mesh, &test, search, tally);
         }
-        let afar = (SlabRay::new(ray, part, &approach), test.filter);
-        self.walk(scope, ray, part, cull, Some(&afar), search, tally);
+        let afar = (SlabRay::new(ray, interval, &approach), test.filter);
+        self.walk(scope, ray, interval, cull, Some(&afar), search, tally);
     }
 
     /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it meets.
@@ -103,16 +103,16 @@ impl Bvh<'_> {
         &self,
         scope: &Scope<'_>,
         ray: &Ray,
-        part: [f32; 2],
+        interval: [f32; 2],
         cull: Cull,
         afar: Option<&(SlabRay, RayFilter)>,
         search: &mut F,
         tally: &mut T,
     ) -> bool {
         let Scope { mesh, bounds, simd } = scope;
-        let bvh = self;
+        let (bvh, resume) = (self, None);
         let one =
-            &mut OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume: None };
+            &mut OneRay { bvh, mesh, ray, interval, cull, bounds, afar, search, tally, resume };
         let mut stack = [0; FIRST_STACK];
         match walk_on(one, *simd, &mut stack) {
             Walked::Through => true,
@@ -213,7 +213,7 @@ mod tests {
                     bvh,
                     mesh: scope.mesh,
                     ray,
-                    part: [0.0, f32::INFINITY],
+                    interval: [0.0, f32::INFINITY],
                     cull: Cull::None,
                     bounds: &scope.bounds,
                     afar: None,

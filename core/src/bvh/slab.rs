@@ -101,8 +101,8 @@ pub(crate) struct SlabRay {
 }
 
 impl SlabRay {
-    /// A part of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther away, is
-    /// empty or invalid, or has a very long or short direction.
+    /// An interval of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther away,
+    /// is empty or invalid, or has a very long or short direction.
     #[inline(always)]
     pub(crate) fn nearby(
         ray: &Ray,
@@ -154,7 +154,7 @@ impl SlabRay {
         Some((slab_ray, filter))
     }
 
-    /// A part of a ray that starts where its approach says.
+    /// An interval of a ray that starts where its approach says.
     #[cold]
     #[inline(never)]
     pub(crate) fn new(ray: &Ray, [begin, until]: [f32; 2], approach: &Approach) -> Self {

@@ -45,9 +45,9 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) ray: &'r Ray,
-    /// The part of its range in which hits matter: from `t_min` or the last hit that was found before, to `t_max` or
-    /// the closest hit in another instance.
-    pub(crate) part: [f32; 2],
+    /// The interval of its range in which hits matter: from `t_min` or the last hit that was found before, to `t_max`
+    /// or the closest hit in another instance.
+    pub(crate) interval: [f32; 2],
     pub(crate) cull: Cull,
     /// The box of the tree.
     pub(crate) bounds: &'r Aabb,
@@ -322,10 +322,10 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Walked {
         let Walk { one, stack } = self;
-        let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, resume } = one;
-        let (part, cull, afar) = (*part, *cull, *afar);
+        let OneRay { bvh, mesh, ray, interval, cull, bounds, afar, search, tally, resume } = one;
+        let (interval, cull, afar) = (*interval, *cull, *afar);
         let nearby =
-            if afar.is_none() { SlabRay::nearby(ray, part, bounds) } else { afar.copied() };
+            if afar.is_none() { SlabRay::nearby(ray, interval, bounds) } else { afar.copied() };
         let Some((slab_ray, filter)) = nearby else { return Walked::TooFar };
         let slab_ray = &slab_ray;
         // Boxes need no filter: the compiler drops its computation.
