@@ -140,7 +140,7 @@ pub(crate) const fn index_bytes(ids: u64, nodes: u64, fine: u64) -> u64 {
 }
 
 /// Bytes of the counts of all bins for so many tasks.
-pub(crate) const fn count_bytes(triangles: u64, tasks: u64) -> u64 {
+const fn count_bytes(triangles: u64, tasks: u64) -> u64 {
     (tasks + 1) * section_bytes::<u32>(1 << bin_bits(triangles))
 }
 

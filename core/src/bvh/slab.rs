@@ -59,7 +59,7 @@ pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 /// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends:
 /// for the error of a `t`, and for underflow.
 #[inline(always)]
-pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
+fn growth_of_range(extent: f32, scale: f32) -> f32 {
     extent * OF_CORNERS + TINY * scale.max(1.0)
 }
 
@@ -101,8 +101,8 @@ pub(crate) struct SlabRay {
 }
 
 impl SlabRay {
-    /// An interval of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther away,
-    /// is empty or invalid, or has a very long or short direction.
+    /// An interval of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther
+    /// away, is empty or invalid, or has a very long or short direction.
     #[inline(always)]
     pub(crate) fn nearby(
         ray: &Ray,

@@ -19,7 +19,7 @@ pub(crate) const STACK: usize = 7 * LEVELS as usize + 1;
 /// The most levels of a tree for which the small stack is large enough, as it is for nearly all.
 pub(crate) const FEW_LEVELS: u32 = 14;
 /// Places on a small stack.
-pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
+const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
 /// A child on the stack: in the high half the bits of the distance at which the ray enters it, in the low
 /// half its node and slot.

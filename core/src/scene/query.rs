@@ -293,7 +293,7 @@ impl QueryParameters {
 }
 
 /// The filter of one ray: it gets no place in a batch.
-pub(super) type HitFilter<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
+type HitFilter<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
 
 /// The search over the instances whose boxes a ray meets.
 pub(super) struct InstanceSearch<'q, 'f> {

@@ -25,7 +25,7 @@ const LIMITS: Limits =
 
 /// Levels of nodes, at most. Where parts are halved, a level divides a range by eight, so ten levels reach the leaves
 /// from 2^31 triangles; one is to spare.
-pub(super) const MOST_LEVELS: u32 = LIMITS.halved_from + 11;
+const MOST_LEVELS: u32 = LIMITS.halved_from + 11;
 
 const _: () = assert!(MOST_LEVELS <= LEVELS);
 
