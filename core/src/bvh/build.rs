@@ -2,13 +2,13 @@
 //!
 //! One pass over the vertices finds their box. One over the triangles finds their keys; it runs twice if unused
 //! vertices widen the box. One over the keys moves entries into bins. The triangles are read again when their bin is
-//! cut.
+//! split.
 //!
 //! ```text
 //! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
 //! scatter   each triangle's entry into its bin                                  (scatter.rs)
-//! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)
+//! roots     bins sorted and split into subtrees                                 (roots.rs, subtree.rs)
 //! top       a tree over the subtrees                                            (top.rs)
 //!
 //! index   | header | ids (first the keys, then centres) | nodes: root | subtrees of all tasks (first centres) | top |
@@ -38,7 +38,6 @@ use glam::Vec3A;
 use zerocopy::{FromZeros, IntoBytes};
 
 use super::census::{Census, count};
-use super::cut::{Item, item};
 use super::fine::{FineList, FineSides, most_fine};
 use super::high;
 use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
@@ -49,6 +48,7 @@ use super::layout::{
 };
 use super::node::{Node, least_node};
 use super::roots::{RECORD, RootRecord, Roots};
+use super::sah::{Item, item};
 use super::scatter::{place_tasks, scatter};
 use super::subtree::Subtree;
 use super::top::{self, ITEM, Top};
@@ -225,7 +225,7 @@ fn build_in(
     let entries = entries.get_mut(..finite as usize).unwrap_or_default();
     scatter(keys, entries, counts, bits, control)?;
 
-    // Cut bins into subtrees.
+    // Split bins into subtrees.
     watch.at(ROOTS)?;
     let (ids, nodes) = cut_index(&mut index, finite);
     let bounds = Lattice::pad(&bounds);
@@ -406,7 +406,7 @@ impl BuildInputs<'_> {
         let bits = KEY_BITS - self.shift;
         let tasks = counts.len() >> bits;
         let mut ends = [0; tasks::MOST];
-        self.cut(&mut ends, tasks, entries.len());
+        self.find_ends(&mut ends, tasks, entries.len());
         // The root of the tree is the first node.
         debug_assert!(!nodes.is_empty(), "several tasks without room for nodes");
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
@@ -476,7 +476,7 @@ impl BuildInputs<'_> {
 
     /// Finds where the units of each task end: at the seam nearest to the end of an equal share of the entries. A task
     /// may have no entries, and the last one ends behind the last entry.
-    fn cut(&self, ends: &mut [usize], tasks: usize, entries: usize) {
+    fn find_ends(&self, ends: &mut [usize], tasks: usize, entries: usize) {
         let units = Units::new(self.sizes).filter(|unit| is_seam(unit) || unit.end == entries);
         let mut seams = units.map(|unit| unit.end).peekable();
         let mut end = 0_usize;
@@ -561,7 +561,7 @@ mod tests {
         let work = BuildInputs { mesh, bounds: Aabb::EMPTY, least: 1.0, sizes, shift: 0 };
         let ends_of = |tasks: usize| {
             let mut ends = [0; tasks::MOST];
-            work.cut(&mut ends, tasks, 5 * SEAM);
+            work.find_ends(&mut ends, tasks, 5 * SEAM);
             ends
         };
         let seam = |number: usize| number * SEAM;

@@ -2,8 +2,8 @@
 //!
 //! Quality `fast` builds it from a grid of the triangles' centres, quality `high` by SAH over single triangles
 //! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get a finer grid of their
-//! own. Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps the boxes
-//! of up to eight children in eight bits a side. Some nodes, mostly those with a thin child, keep them as f32, too
+//! own. Cells in Morton order are split into small subtrees, with a tree by SAH above them. A node keeps the boxes of
+//! up to eight children in eight bits a side. Some nodes, mostly those with a thin child, keep them as f32, too
 //! ([`fine`]). A leaf keeps up to eight ids. Triangles stay in the caller's mesh.
 //!
 //! ```text
@@ -18,7 +18,7 @@
 //! ```text
 //! format         node, fine, layout, validate
 //! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`;
-//!                parts (cut) for top and high/
+//!                parts (sah) for top and high/
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays (per_ray), group (boxes, met, group_leaf), interleave
 //! points         nearest
@@ -27,10 +27,10 @@
 //!
 //! Terms of the build:
 //!
-//! - A *bin* is a cell of the grid. The high bits of a triangle's key choose it ([`key`]). The bins of [`cut`] are
+//! - A *bin* is a cell of the grid. The high bits of a triangle's key choose it ([`key`]). The bins of [`sah`] are
 //!   something else: intervals of an axis.
 //! - An *entry* is the key and the id of a triangle ([`layout::Entry`]).
-//! - A *unit* is a bin, or several that follow one another, whose entries are cut into subtrees together ([`units`]).
+//! - A *unit* is a bin, or several that follow one another, whose entries are split into subtrees together ([`units`]).
 //! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own. With more than
 //!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres ([`crowd`]).
 //! - A *root* is the top node of a subtree; the subtree itself is called so, too ([`roots`]). The top node of the
@@ -46,7 +46,6 @@ mod boxes;
 mod build;
 mod census;
 mod crowd;
-mod cut;
 mod fine;
 mod group;
 mod group_leaf;
@@ -64,6 +63,7 @@ mod per_ray;
 mod rays;
 mod refit;
 mod roots;
+mod sah;
 mod scatter;
 mod search;
 mod shape_leaf;

@@ -33,7 +33,7 @@ pub(crate) const WIDTH: usize = 8;
 pub(crate) const LEAF: usize = 8;
 
 /// Triangles that are read into one set of vectors: a leaf of fewer takes as long, one of more takes two sets. A part
-/// of so many or fewer is small, and hardly ever cut.
+/// of so many or fewer is small, and hardly ever split.
 pub(crate) const SMALL_LEAF: usize = 4;
 
 /// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one minimum.

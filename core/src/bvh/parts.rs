@@ -1,11 +1,11 @@
-//! Cuts a range of items into the children of a node.
+//! Splits a range of items into the children of a node.
 //!
 //! ```text
 //! parts = [range]
-//! until there are eight, or all are small: choose a part, cut it in two (cut.rs)
+//! until there are eight, or all are small: choose a part, split it in two (sah.rs)
 //!     choose: of the parts that become nodes the one with the largest surface;
 //!             if there are none, of the leaves the one with the largest surface times count
-//!     from a level on, in the place of both: choose the part with the most items, cut it in the middle
+//!     from a level on, in the place of both: choose the part with the most items, split it in the middle
 //! ```
 //!
 //! A part is a range of items; it has nothing to do with the parts of a joined mesh. An item is a triangle in a tree of
@@ -14,21 +14,21 @@
 use core::ops::Range;
 
 use crate::aabb::Aabb;
-use crate::bvh::cut::{Bins, CutInTwo, Item, box_of};
 use crate::bvh::node::{WIDTH, corners};
+use crate::bvh::sah::{Bins, Item, SplitInTwo, box_of};
 use crate::invariant::OrBug;
 use crate::simd::{SimdLevel, dispatch};
 
-/// How ranges are cut.
+/// How ranges are split.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     /// A part of more items becomes a node.
     pub(crate) leaf: u32,
-    /// A part of at most so many is never cut.
+    /// A part of at most so many is never split.
     pub(crate) small: u32,
     /// Bins of an axis, at most.
     pub(crate) bins: usize,
-    /// The level from which on each cut is in the middle, so that the number of levels is bounded.
+    /// The level from which on each split is in the middle, so that the number of levels is bounded.
     pub(crate) halved_from: u32,
 }
 
@@ -79,8 +79,8 @@ impl Parts {
     }
 }
 
-/// Cuts ranges into parts.
-pub(crate) struct Cutter {
+/// Splits ranges into parts.
+pub(crate) struct Splitter {
     limits: Limits,
     simd_level: SimdLevel,
     /// The factor that scales lengths before areas are computed from them.
@@ -88,14 +88,14 @@ pub(crate) struct Cutter {
     bins: Bins,
 }
 
-impl Cutter {
-    /// A cutter of items within `bounds`.
+impl Splitter {
+    /// A splitter of items within `bounds`.
     pub(crate) fn new(bounds: &Aabb, limits: Limits) -> Self {
         let length_scale = inverse_power(bounds.size().max_element());
         Self { limits, simd_level: SimdLevel::detect(), length_scale, bins: Bins::new() }
     }
 
-    /// Cuts a range into eight parts, or into fewer if all are small. Moves the items, so that each part is a range.
+    /// Splits a range into eight parts, or into fewer if all are small. Moves the items, so that each part is a range.
     /// The parts become the children of a node with `level` levels above.
     pub(crate) fn parts(&mut self, items: &mut [Item], range: &Range<u32>, level: u32) -> Parts {
         let halve = level >= self.limits.halved_from;
@@ -105,27 +105,27 @@ impl Cutter {
         {
             let items = items.get_mut(range.start as usize..range.end as usize);
             let Some(items) = items.or_bug("a part behind the items") else { break };
-            let (count, boxes) = self.cut(items, halve);
+            let (count, boxes) = self.split(items, halve);
             parts.replace(part, range.start + count, boxes, self.length_scale);
         }
         if parts.count == 1 {
-            // Only a range that is small from the start is not cut: that of a root over few triangles.
+            // Only a range that is small from the start is not split: that of a root over few triangles.
             let all = items.get(range.start as usize..range.end as usize);
             parts.boxes[0] = box_around(all.or_bug("a range behind the items").unwrap_or_default());
         }
         parts
     }
 
-    /// Cuts items in two, where the SAH cost is least or else in the middle; returns how many are in the first part,
+    /// Splits items in two, where the SAH cost is least or else in the middle; returns how many are in the first part,
     /// and the boxes of both.
     #[expect(clippy::cast_possible_truncation, reason = "a range has 32 bits")]
-    fn cut(&mut self, items: &mut [Item], halve: bool) -> (u32, [Aabb; 2]) {
-        // Two items can be cut in one way only.
+    fn split(&mut self, items: &mut [Item], halve: bool) -> (u32, [Aabb; 2]) {
+        // Two items can be split in one way only.
         if !halve && items.len() > 2 {
             let (most_bins, length_scale) = (self.limits.bins, self.length_scale);
             let (items, bins) = (&mut *items, &mut self.bins);
-            let cut = CutInTwo { items, most_bins, length_scale, bins };
-            if let Some((middle, boxes)) = dispatch(self.simd_level, cut) {
+            let split = SplitInTwo { items, most_bins, length_scale, bins };
+            if let Some((middle, boxes)) = dispatch(self.simd_level, split) {
                 return (middle as u32, boxes.map(|sides| corners(&sides)));
             }
         }
@@ -135,7 +135,7 @@ impl Cutter {
         (middle as u32, [box_around(first), box_around(second)])
     }
 
-    /// Chooses the part to cut next: of those that become nodes the one with the largest surface, then of leaves the
+    /// Chooses the part to split next: of those that become nodes the one with the largest surface, then of leaves the
     /// one with the largest surface times count; where parts are halved, the one with the most items. `None` if all
     /// are small.
     fn choose(&self, parts: &Parts, halve: bool) -> Option<(usize, Range<u32>)> {
@@ -181,7 +181,7 @@ mod tests {
     use glam::Vec3A;
 
     use super::*;
-    use crate::bvh::cut::{ID, item};
+    use crate::bvh::sah::{ID, item};
     use crate::random;
 
     #[test]
@@ -189,8 +189,8 @@ mod tests {
         let mut state = 1;
         let everywhere = Aabb { min: Vec3A::splat(-1.0), max: Vec3A::splat(2.0) };
         for (leaf, small) in [(8, 4), (1, 1)] {
-            let mut cutter =
-                Cutter::new(&everywhere, Limits { leaf, small, bins: 16, halved_from: 1 });
+            let mut splitter =
+                Splitter::new(&everywhere, Limits { leaf, small, bins: 16, halved_from: 1 });
             for (count, level) in (1..100).flat_map(|count| [(count, 0), (count, 1)]) {
                 // In every third range all items have the same box, so that no bins tell them apart.
                 let mut point =
@@ -201,7 +201,7 @@ mod tests {
                     .map(|(id, min)| item(&Aabb { min, max: min + 0.1 }, id, 1))
                     .collect();
                 let mut items = before.clone();
-                let parts = cutter.parts(&mut items, &range, level);
+                let parts = splitter.parts(&mut items, &range, level);
                 let mut end = range.start;
                 for (part, bounds) in parts.ranges().zip(&parts.boxes) {
                     assert!(part.start == end && part.end > end, "{count}");
@@ -215,7 +215,7 @@ mod tests {
                 let parts = parts.ranges().count();
                 assert!(parts == WIDTH || most <= small, "{count}");
                 assert_eq!(parts == 1, count <= small);
-                // Halves differ by one at most, and the largest is cut first.
+                // Halves differ by one at most, and the largest is split first.
                 assert!(level == 0 || most <= 2 * least + 1, "{count}");
                 items[range.start as usize..range.end as usize].sort_by_key(|item| item[ID]);
                 assert_eq!(items, before);
@@ -226,8 +226,8 @@ mod tests {
     #[test]
     fn nodes_are_cut_before_leaves_and_wide_parts_before_others() {
         let limits = Limits { leaf: 8, small: 4, bins: 16, halved_from: 1 };
-        let cutter = Cutter::new(&Aabb { min: Vec3A::ZERO, max: Vec3A::ONE }, limits);
-        // Parts of so many items with such surfaces; the part that is cut next, and the one if parts are halved.
+        let splitter = Splitter::new(&Aabb { min: Vec3A::ZERO, max: Vec3A::ONE }, limits);
+        // Parts of so many items with such surfaces; the part that is split next, and the one if parts are halved.
         let cases = [
             ([(8, 9.0), (9, 1.0), (3, 50.0), (5, 20.0)], [Some(1), Some(1)]),
             ([(10, 9.0), (9, 1.0), (9, 10.0), (5, 20.0)], [Some(2), Some(0)]),
@@ -243,7 +243,7 @@ mod tests {
             }
             for (halve, chosen) in [false, true].into_iter().zip(chosen) {
                 let expected = chosen.map(|at| (at, parts.ends[at]..parts.ends[at + 1]));
-                assert_eq!(cutter.choose(&parts, halve), expected);
+                assert_eq!(splitter.choose(&parts, halve), expected);
             }
         }
     }

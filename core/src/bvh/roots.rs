@@ -38,7 +38,7 @@ use super::layout::{
 };
 use super::node::{LEAF, Node, WIDTH};
 use super::sort::sort;
-use super::subtree::{Build, Cut, Subtree};
+use super::subtree::{Build, SplitRule, Subtree};
 use super::units::{RootBudget, starts};
 
 /// The record of a root: its node, its box and its counts.
@@ -119,7 +119,7 @@ impl Roots<'_> {
                 }
             }
             // Equal centres keep the order of their ids. So do units that are still crowded: their keys are not in
-            // order, and each cut would look for a change of bits anew.
+            // order, and each split would look for a change of bits anew.
             for entry in self.entries.get_mut(range.clone()).into_iter().flatten() {
                 entry[0] = 0;
             }
@@ -131,7 +131,7 @@ impl Roots<'_> {
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
             sort(self.simd_level, entries, spare, (32 - differing.leading_zeros()).max(shift));
         }
-        self.cut(range);
+        self.make_roots(range);
     }
 
     /// Makes roots of the entries of a unit, which are sorted by key. A range of more than [`MOST_ROOT`] entries is
@@ -139,8 +139,8 @@ impl Roots<'_> {
     /// equal. No part has fewer than [`LEAST_PIECE`] entries.
     ///
     /// A unit that is still too large after [`DIVISIONS`] divisions is halved by ids, which makes worse boxes.
-    fn cut(&mut self, range: Range<usize>) {
-        // In order, a cut ends after at most one split for each bit of a key, and one for each halving.
+    fn make_roots(&mut self, range: Range<usize>) {
+        // In order, this ends after at most one split for each bit of a key, and one for each halving.
         debug_assert!(
             self.entries
                 .get(range.clone())
@@ -158,10 +158,10 @@ impl Roots<'_> {
         }
     }
 
-    /// Returns the length of the first part of a range cut in two; neither part has fewer than [`LEAST_PIECE`] entries.
+    /// Splits a range in two and returns the length of the first part. No part has fewer than [`LEAST_PIECE`] entries.
     fn split(&self, range: Range<usize>) -> usize {
         let entries = self.entries.get(range).unwrap_or_default();
-        debug_assert!(entries.len() > MOST_ROOT, "too few entries to cut");
+        debug_assert!(entries.len() > MOST_ROOT, "too few entries to split");
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
         let differing = first[0] ^ last[0];
         let middle = if differing == 0 {
@@ -182,7 +182,7 @@ impl Roots<'_> {
         let Some(entries) = self.entries.get(range.clone()) else { return };
         // Make the subtree, and copy its ids and nodes to the index.
         let subtree = &mut *self.subtree;
-        let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
+        let (mesh, least, by) = (self.mesh, self.least, SplitRule::Keys);
         dispatch(self.simd_level, Build { subtree, mesh, entries, first, child, least, by });
         // Too little room for ids and nodes is legal: they are counted.
         copy_what_fits(self.subtree.ids(), self.ids.get_mut(range.clone()));

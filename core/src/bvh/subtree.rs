@@ -5,21 +5,21 @@
 //! note in which bit neighbours' keys differ first
 //! ranges = [all]
 //! for each range of more than a leaf, breadth first:
-//!     cut it in eight where neighbours differ in the highest bits, but no small part; halve what has equal keys
+//!     split it in eight where neighbours differ in the highest bits, but no small part; halve what has equal keys
 //!     parts of a leaf's size or less become leaves, the others nodes
 //! for each node, last first: the box of a child is the union of its triangles' boxes, or its node's box;
 //!                            quantise all eight
 //! ```
 //!
 //! A part is small if it has four triangles or fewer. A query reads four at once, so two leaves of two take twice as
-//! long as one of four. Two bits cut small parts, too, because triangles that differ in them may lie far apart: the
+//! long as one of four. Two bits split small parts, too, because triangles that differ in them may lie far apart: the
 //! highest that changes in the range, and the next lower one that changes anywhere in the subtree.
 //!
 //! A subtree over `m` triangles has one node, or (m - 1) / 7 at most. Let `a` nodes have nodes among their children,
 //! and `b` have none. Each of the `a` has eight children. Of these 8 a children, a + b - 1 are nodes (all but the
 //! root); the others are leaves of one triangle or more. Each of the `b` has nine triangles or more, unless it is the
 //! only node. So m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes for the
-//! memory bound is cut again, by halves only.
+//! memory bound is split again, by halves only.
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
@@ -74,9 +74,9 @@ pub(crate) struct Subtree {
     places: [u128; 32],
 }
 
-/// The rule by which ranges are cut.
+/// The rule by which ranges are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Cut {
+pub(crate) enum SplitRule {
     /// Between neighbours whose keys differ in the highest bits.
     Keys,
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
@@ -85,7 +85,7 @@ pub(crate) enum Cut {
 
 /// Entries of a part that is small, at most.
 const SMALL: u8 = SMALL_LEAF as u8;
-/// The number of bits of the keys that may cut small parts, too: the highest that changes in the range, and the next
+/// The number of bits of the keys that may split small parts, too: the highest that changes in the range, and the next
 /// lower that changes anywhere in the subtree.
 const FREE_BITS: u32 = 2;
 
@@ -107,7 +107,7 @@ impl EntryRange {
 }
 
 /// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids lie in the index from `first` on, the nodes
-/// below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the tree. Where cuts by keys
+/// below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the tree. Where splits by keys
 /// make more nodes than the layout has room for, ranges are halved.
 pub(crate) struct Build<'w> {
     pub(crate) subtree: &'w mut Subtree,
@@ -116,8 +116,8 @@ pub(crate) struct Build<'w> {
     pub(crate) first: u32,
     pub(crate) child: u32,
     pub(crate) least: f32,
-    /// The rule to cut by at first.
-    pub(crate) by: Cut,
+    /// The rule to split by at first.
+    pub(crate) by: SplitRule,
 }
 
 impl Kernel for Build<'_> {
@@ -131,10 +131,10 @@ impl Kernel for Build<'_> {
         subtree.read(simd, mesh, entries);
         loop {
             subtree.shape(simd, by);
-            if by == Cut::Halves || subtree.count <= 1 + most_of_root(entries.len()) {
+            if by == SplitRule::Halves || subtree.count <= 1 + most_of_root(entries.len()) {
                 break;
             }
-            by = Cut::Halves;
+            by = SplitRule::Halves;
         }
         debug_assert!(subtree.id_count == entries.len(), "a subtree without some of its entries");
         // Quantise, children before parents.
@@ -216,10 +216,10 @@ impl Subtree {
         self.ranges[0] = EntryRange { start: 0, end: count as u8 };
     }
 
-    /// Cuts all ranges of more than a leaf, breadth first.
+    /// Splits all ranges of more than a leaf, breadth first.
     #[inline(always)]
-    fn shape<S: Simd>(&mut self, simd: S, by: Cut) {
-        if by == Cut::Halves {
+    fn shape<S: Simd>(&mut self, simd: S, by: SplitRule) {
+        if by == SplitRule::Halves {
             self.changes = [0; MOST_ROOT];
         }
         let bits = if HAS_VECTORS { self.find_places(simd) } else { self.find_places_one_by_one() };
@@ -227,7 +227,7 @@ impl Subtree {
         self.tops[0] = 31;
         let mut at = 0;
         while at < self.count {
-            self.cut(at, bits);
+            self.split(at, bits);
             at += 1;
         }
     }
@@ -262,9 +262,9 @@ impl Subtree {
         bits & !1
     }
 
-    /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for each other.
+    /// Splits the range of a node into parts, writes the ids of those that are leaves and adds a node for each other.
     #[inline(always)]
-    fn cut(&mut self, at: usize, bits: u32) {
+    fn split(&mut self, at: usize, bits: u32) {
         debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(&range), Some(&above), Some(&top)) =
             (self.ranges.get(at), self.above.get(at), self.tops.get(at))
@@ -373,17 +373,17 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     [x, y, z, 0.0, u, v, w, 0.0]
 }
 
-/// Cuts a range, in the order of the keys, into eight parts, or into fewer if all are small: where keys change in the
+/// Splits a range, in the order of the keys, into eight parts, or into fewer if all are small: where keys change in the
 /// highest bits; then it halves the largest part. Also returns the lowest bit that [`highest`] looked at.
 #[inline(always)]
 fn parts(range: EntryRange, bits: u32, places: &[u128; 32]) -> ([EntryRange; WIDTH], u8) {
     let mut parts = [EntryRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
-    let (mut cuts, top) = highest(range, bits, places);
-    while cuts != 0 && count < WIDTH - 1 {
-        let end = cuts.trailing_zeros() as u8 + 1;
-        cuts &= cuts - 1;
+    let (mut splits, top) = highest(range, bits, places);
+    while splits != 0 && count < WIDTH - 1 {
+        let end = splits.trailing_zeros() as u8 + 1;
+        splits &= splits - 1;
         parts[count] = EntryRange { start, end };
         start = end;
         count += 1;
@@ -413,9 +413,9 @@ fn parts(range: EntryRange, bits: u32, places: &[u128; 32]) -> ([EntryRange; WID
     (parts, top)
 }
 
-/// Finds up to seven places inside a range at which to cut it: those where the highest bits of the keys change. A place
-/// that would cut a small part is left out, except for the first [`FREE_BITS`] bits. Returns a mask of the places, and
-/// the lowest bit of the keys that was looked at.
+/// Finds up to seven places inside a range at which to split it: those where the highest bits of the keys change.
+/// Leaves out places that would split a small part, except for the first [`FREE_BITS`] bits. Returns a mask of the
+/// places, and the lowest bit of the keys that was looked at.
 #[inline(always)]
 fn highest(range: EntryRange, bits: u32, places: &[u128; 32]) -> (u128, u8) {
     // A range of one entry or none has no inside.
@@ -525,7 +525,7 @@ mod tests {
                 if which < 3 {
                     entries.sort_by_key(|entry| entry[0]);
                 }
-                for by in [Cut::Keys, Cut::Halves] {
+                for by in [SplitRule::Keys, SplitRule::Halves] {
                     let (subtree, mesh, entries) = (&mut subtree, &mesh, &*entries);
                     let (first, child, least) = (1000, 500, 1e-6);
                     let build = Build { subtree, mesh, entries, first, child, least, by };

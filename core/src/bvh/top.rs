@@ -2,25 +2,25 @@
 //!
 //! ```text
 //! parts = [all roots]
-//! until there are eight: cut the part with the largest surface by binned SAH (parts.rs)
+//! until there are eight: split the part with the largest surface by binned SAH (parts.rs)
 //!                        (16 bins an axis at most, by centre; an item costs ceil(triangles / 4));
-//!                        from level 20 on: cut the part with the most roots in the middle
+//!                        from level 20 on: split the part with the most roots in the middle
 //! parts of one root become that root's node, the others nodes of their own, breadth first
 //! ```
 
 use crate::aabb::Aabb;
 use crate::invariant::OrBug;
 
-use super::cut::{ID, Item};
 use super::fine::FineList;
 use super::layout::Entry;
 use super::node::{Node, least_node};
-use super::parts::{Cutter, Limits};
+use super::parts::{Limits, Splitter};
+use super::sah::{ID, Item};
 
 /// An item in entries.
 pub(crate) const ITEM: usize = size_of::<Item>() / size_of::<Entry>();
 
-/// How ranges of roots are cut. More bins make rays no faster.
+/// How ranges of roots are split. More bins make rays no faster.
 const LIMITS: Limits = Limits { leaf: 1, small: 1, bins: 16, halved_from: 20 };
 
 /// The tree over the roots.
@@ -50,7 +50,7 @@ pub(crate) fn build(
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
     let item_count = items.len() as u32;
     fine.clear();
-    let mut cutter = Cutter::new(bounds, LIMITS);
+    let mut splitter = Splitter::new(bounds, LIMITS);
     // A node that waits keeps its range and level where its children will be.
     let mut root = Node::unbuilt(0, item_count, 0);
     let (mut count, mut levels) = (0, 0);
@@ -62,8 +62,8 @@ pub(crate) fn build(
             Some(_) => break,
         };
         let Some([start, end, level]) = node.waiter() else { continue };
-        // Cut the range of a node that waits, and make a child of each part.
-        let parts = cutter.parts(items, &(start..end), level);
+        // Split the range of a node that waits, and make a child of each part.
+        let parts = splitter.parts(items, &(start..end), level);
         let mut node = Node { child: child + count, ..Node::EMPTY };
         for (slot, part) in parts.ranges().enumerate() {
             node.set_inner(slot);
@@ -99,8 +99,8 @@ mod tests {
     use glam::Vec3A;
 
     use super::*;
-    use crate::bvh::cut::item;
     use crate::bvh::node::Child;
+    use crate::bvh::sah::item;
 
     /// The tree over items of these boxes, each a root with one level: every item once, in so many levels.
     fn build_over(boxes: &[Aabb]) -> u32 {
@@ -152,7 +152,7 @@ mod tests {
             }
             // All in one place, where nothing tells them apart.
             build_over(&vec![cube(0.0, 1.0); count]);
-            // Each half as large as the one before: SAH cuts off a few at a time.
+            // Each half as large as the one before: SAH splits off a few at a time.
             let nested: Vec<_> = (0..count.min(200))
                 .map(|i| {
                     #[expect(clippy::cast_possible_truncation, reason = "small")]
@@ -178,7 +178,7 @@ mod tests {
             let line: Vec<_> =
                 (0_u8..100).map(|i| cube(f32::from(i) / 100.0 * scale, 0.0)).collect();
             assert!(build_over(&line) <= 9, "{scale}");
-            // Boxes on an axis have no surface at all, so that all cuts cost the same.
+            // Boxes on an axis have no surface at all, so that all splits cost the same.
             let on_axis = line.iter().map(|point| point.min * Vec3A::X);
             let on_axis: Vec<_> = on_axis.map(|at| Aabb { min: at, max: at }).collect();
             assert!(build_over(&on_axis) <= 9, "{scale}");

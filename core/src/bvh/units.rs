@@ -1,4 +1,4 @@
-//! Groups bins into units, each of which is cut into roots by itself.
+//! Groups bins into units, each of which is split into roots by itself.
 //!
 //! A unit should be a single bin: neighbours in Morton order may lie far apart, and a root over both has a large box.
 //! But the memory bound allows only one root for [`TRIANGLES_PER_ROOT`] triangles. A running balance keeps to it.
@@ -189,7 +189,7 @@ mod tests {
         // The triangles that a large bin has to spare count for small bins behind it.
         assert_eq!(units(&[3 * per_root, 1, 0, 2, per_root - 3]).len(), 4);
         assert_eq!(units(&[per_root, 3 * per_root, 1, 0, 2, per_root - 3]).len(), 5);
-        // Bins that are cut into several roots have fewer to spare.
+        // Bins that are split into several roots have fewer to spare.
         assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
         assert_eq!(units(&[crowd, per_root, crowd]).len(), 3);
         // One triangle more than a single root takes makes four, which leave less for small bins.

@@ -4,8 +4,8 @@
 //! holds it, with the margin that the slab test relies on ([`node`](super::node)). One walk over all nodes checks this:
 //!
 //! ```text
-//! node   a build writes such a node; each child may fill its box, cut with the boxes above; fine sides, if it has
-//!        some, are its own and cut that box, too
+//! node   a build writes such a node; each child may fill its box, clipped to those above; fine sides, if it has
+//!        some, are its own and clip that box, too
 //! leaf   each triangle is finite, lies in what its leaf may fill, and has no bit in scratch yet: set it
 //! end    as many nodes and ids were met as there are
 //! ```

@@ -3,7 +3,7 @@
 //! ```text
 //! stack = [[all triangles]]
 //! take the next range of the entry on top; drop the entry if it has none
-//! cut it until there are eight parts, or all have four triangles or fewer (parts.rs)
+//! split it until there are eight parts, or all have four triangles or fewer (parts.rs)
 //!     a part of a leaf's size:                write its ids
 //!     a part of at most `wait` triangles:     leave it to a task
 //! push the other parts as one entry; quantise the boxes, write the node
@@ -12,14 +12,14 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::aabb::Aabb;
-use crate::bvh::cut::{ID, Item, MOST_BINS};
 use crate::bvh::fine::FineList;
 use crate::bvh::layout::LEVELS;
 use crate::bvh::node::{LEAF, Node, SMALL_LEAF, WIDTH, least_node};
-use crate::bvh::parts::{Cutter, Limits};
+use crate::bvh::parts::{Limits, Splitter};
+use crate::bvh::sah::{ID, Item, MOST_BINS};
 use crate::invariant::OrBug;
 
-/// How ranges of triangles are cut.
+/// How ranges of triangles are split.
 const LIMITS: Limits =
     Limits { leaf: LEAF as u32, small: SMALL_LEAF as u32, bins: MOST_BINS, halved_from: 24 };
 
@@ -109,7 +109,7 @@ impl Grow<'_, '_> {
     #[inline(never)]
     pub(super) fn run(mut self) -> Grown {
         let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
-        let mut cutter = Cutter::new(self.bounds, LIMITS);
+        let mut splitter = Splitter::new(self.bounds, LIMITS);
         let least = least_node(self.bounds);
         // One entry a level: under the nodes of an entry are those of the next. The first entry holds the root alone.
         let mut stack = [Siblings::NONE; MOST_LEVELS as usize];
@@ -121,13 +121,13 @@ impl Grow<'_, '_> {
         while let Some(siblings) =
             u32::checked_sub(depth, 1).and_then(|last| stack.get_mut(last as usize))
         {
-            // Take a range, and cut it into up to eight parts.
+            // Take a range, and split it into up to eight parts.
             let Some(job) = siblings.next(self.level + depth - 1) else {
                 depth -= 1;
                 continue;
             };
             grown.levels = grown.levels.max(job.level + 1);
-            let parts = cutter.parts(self.items, &(job.start..job.end), job.level);
+            let parts = splitter.parts(self.items, &(job.start..job.end), job.level);
             let mut node = Node {
                 child: self.child + grown.nodes,
                 first: self.first + grown.ids,

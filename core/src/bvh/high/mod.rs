@@ -9,8 +9,8 @@
 //! scratch | items: 32 B a triangle; the record of a range that is done replaces its items  | fine sides |
 //! ```
 //!
-//! A node cuts the range of its triangles until it has eight children, or all have four triangles or fewer, so that no
-//! child is a node. Only a range of nine or more is a node. So `n` triangles have one node, or (n - 2) / 7 at most. By
+//! A node splits the range of its triangles until it has eight children, or all have four triangles or fewer, so that
+//! none is a node. Only a range of nine or more is a node. So `n` triangles have one node, or (n - 2) / 7 at most. By
 //! induction: let `j` of the children be nodes. For `j` = 0 one node is enough. Otherwise there are eight children;
 //! those that are no nodes have a triangle or more each, so the others have n - (8 - j) at most, and there are 1 + (n -
 //! (8 - j) - 2 j) / 7 = (n - 1 - j) / 7 nodes at most. A chain of nodes with seven leaves of one triangle has as many.
@@ -28,11 +28,11 @@ mod grow;
 use fearless_simd::Simd;
 use zerocopy::transmute;
 
-use super::cut::{Item, item};
 use super::fine::{FineList, FineSides, most_fine};
 use super::index::{Contents, clear_header, cut_index, finish, move_nodes};
 use super::layout::index_bytes;
 use super::node::Node;
+use super::sah::{Item, item};
 use crate::aabb::Aabb;
 use crate::arena::{first_mut, move_down, section_bytes, split_mut};
 use crate::blob::Header;

@@ -1,9 +1,9 @@
-//! Cuts items in two where the SAH cost is least (Wald 2007).
+//! Splits items in two where the SAH cost is least (Wald 2007).
 //!
 //! ```text
 //! for each item:  grow the box of the centres, which the bins divide
 //! for each item:  bin of its centre on each axis; grow the bins' boxes, add its cost
-//! for each axis:  sweep from both ends; cost of a cut = area * cost of the items, summed over both sides
+//! for each axis:  sweep from both ends; cost of a split = area * cost of the items, summed over both sides
 //! for each item:  move it to the first part or the second
 //! ```
 //!
@@ -225,7 +225,7 @@ impl Bins {
         }
     }
 
-    /// Sweeps over each axis from both ends, for the cut of least cost.
+    /// Sweeps over each axis from both ends, for the split of least cost.
     #[inline(always)]
     fn best<S: Simd>(&self, simd: S, rule: &BinScale, length_scale: f32) -> Option<Split> {
         debug_assert!(rule.count <= MOST_BINS, "more bins than there is room for");
@@ -257,19 +257,19 @@ impl Bins {
     }
 }
 
-/// Cuts items in two; returns how many are in the first part, and the boxes of both parts. `None` if no bins tell the
+/// Splits items in two; returns how many are in the first part, and the boxes of both parts. `None` if no bins tell the
 /// items apart.
-pub(crate) struct CutInTwo<'w> {
+pub(crate) struct SplitInTwo<'w> {
     pub(crate) items: &'w mut [Item],
     /// Bins of an axis, at most.
     pub(crate) most_bins: usize,
     /// The factor that scales lengths before areas are computed from them.
     pub(crate) length_scale: f32,
-    /// Bins that other cuts may have used.
+    /// Bins that other splits may have used.
     pub(crate) bins: &'w mut Bins,
 }
 
-impl Kernel for CutInTwo<'_> {
+impl Kernel for SplitInTwo<'_> {
     type Output = Option<(usize, [Sides; 2])>;
 
     #[inline(always)]
@@ -279,10 +279,10 @@ impl Kernel for CutInTwo<'_> {
         let count = bin_count(items.len()).min(most_bins);
         let rule = BinScale::new(simd, count, box_of_centers(simd, items));
         bins.fill(simd, items, &rule);
-        // Find the cheapest cut, and the boxes of its parts.
+        // Find the cheapest split, and the boxes of its parts.
         let split = bins.best(simd, &rule, length_scale)?;
         let bins = bins.0[split.axis()].get(..rule.count).unwrap_or_default();
-        let parts = bins.split_at_checked(split.bin()).or_bug("a cut behind the bins");
+        let parts = bins.split_at_checked(split.bin()).or_bug("a split behind the bins");
         let (first, second) = parts.unwrap_or_default();
         let boxes = [union(simd, first), union(simd, second)];
         // Move the items.
@@ -292,7 +292,7 @@ impl Kernel for CutInTwo<'_> {
     }
 }
 
-/// Brings the items before a cut to the front; returns how many there are.
+/// Brings the items before a split to the front; returns how many there are.
 ///
 /// This is Lomuto's partition as one cycle of moves. The first item is set aside and leaves a gap. Each step moves the
 /// item behind the first part into the gap, and puts the item behind the gap in its place, which leaves the next gap.
@@ -354,10 +354,10 @@ mod tests {
     use crate::random;
     use crate::simd::{SimdLevel, dispatch};
 
-    /// Finds the box of twice the centres of some items, then cuts them, with bins that earlier cuts have used.
-    struct CutOf<'a>(&'a mut [Item], &'a mut Bins);
+    /// Finds the box of twice the centres of some items, then splits them, with bins that earlier splits have used.
+    struct SplitOf<'a>(&'a mut [Item], &'a mut Bins);
 
-    impl Kernel for CutOf<'_> {
+    impl Kernel for SplitOf<'_> {
         type Output = (Sides, Option<(usize, [Sides; 2])>);
 
         #[inline(always)]
@@ -366,7 +366,7 @@ mod tests {
             let centers = box_of_centers(simd, items).into();
             (
                 centers,
-                CutInTwo { items, most_bins: MOST_BINS, length_scale: LENGTH_SCALE, bins }
+                SplitInTwo { items, most_bins: MOST_BINS, length_scale: LENGTH_SCALE, bins }
                     .run(simd),
             )
         }
@@ -411,7 +411,7 @@ mod tests {
         BinScale { low: array::from_fn(|axis| centers[axis]), scale, count }
     }
 
-    /// Makes the same cut, found by trying each; of equal ones that of the first axis, then of the last bin. Leaves
+    /// Makes the same split, found by trying each; of equal ones that of the first axis, then of the last bin. Leaves
     /// both parts in the order of their ids.
     fn naive(items: &mut [Item]) -> Option<(usize, [Sides; 2])> {
         let rule = naive_rule(items);
@@ -443,7 +443,7 @@ mod tests {
     fn the_cheapest_cut_is_found_alike_with_all_vectors() {
         let mut state = 1;
         let mut bins = Bins::new();
-        // The first count uses all bins. Later cuts must not read what it left there.
+        // The first count uses all bins. Later splits must not read what it left there.
         for count in [400_u32, 2, 5, 7, 8, 9, 32, 33, 100, 256, 257, 259] {
             // Coordinates of few bits make ties. In the last three kinds the centres lie in a plane, on a line and in
             // one place.
@@ -467,9 +467,9 @@ mod tests {
                 let mut order: Option<Vec<Item>> = None;
                 for level in SimdLevel::available() {
                     let mut items = items.clone();
-                    let (centers_of, cut) = dispatch(level, CutOf(&mut items, &mut bins));
+                    let (centers_of, split) = dispatch(level, SplitOf(&mut items, &mut bins));
                     let case = format!("{level:?}, {count}, {steps}, {flat}");
-                    assert_eq!((centers_of, cut), (centers, found), "{case}");
+                    assert_eq!((centers_of, split), (centers, found), "{case}");
                     // All levels leave the items in the same order.
                     assert_eq!(order.get_or_insert_with(|| items.clone()), &items, "{case}");
                     let (first, second) = items.split_at_mut(middle);
