@@ -256,8 +256,8 @@ impl Scene<'_> {
         let mut steps = Counters::default();
         let mut offer = BoxSearch(&mut |number| offered.offer(number));
         if level == 0 {
-            let cut = RayF64 { t_max, ..*ray };
-            self.tree.search_boxes(&cut, &mut offer, &mut steps);
+            let shortened = RayF64 { t_max, ..*ray };
+            self.tree.search_boxes(&shortened, &mut offer, &mut steps);
         } else {
             let ObjectRay { line, scale, .. } = ObjectRay::new(line)?;
             let range = [ray.t_min, t_max];

@@ -340,9 +340,9 @@ impl CellSpread<'_> {
         // Settle the density as for the top.
         let mut density = f64::from(density);
         let (cells, reference_count) = loop {
-            let is_cut = self.frame.cut(self.lattice.cell_size(), density, count);
+            let is_refined = self.frame.refine(self.lattice.cell_size(), density, count);
             density *= 0.5;
-            if !is_cut {
+            if !is_refined {
                 continue;
             }
             let cells = self.frame.cells();

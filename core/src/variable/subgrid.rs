@@ -44,7 +44,7 @@ impl Frame {
         self.resolution.iter().map(|&cells| cells as usize).product()
     }
 
-    /// The frame around the part of a cell that primitives reach; [`cut`](Self::cut) sets its resolution.
+    /// The frame around the part of a cell that primitives reach; [`refine`](Self::refine) sets its resolution.
     pub(super) fn around(reach: &Aabb, cell: [u32; 3]) -> Self {
         let corner = Vec3A::from_array(cell.map(as_f32));
         let part = |position: Vec3A| {
@@ -63,7 +63,7 @@ impl Frame {
 
     /// Sets Woo's resolution for so many primitives in this box of a cell with this size; false if an axis would need
     /// too many cells.
-    pub(super) fn cut(&mut self, cell_size: Vec3A, density: f64, primitives: u32) -> bool {
+    pub(super) fn refine(&mut self, cell_size: Vec3A, density: f64, primitives: u32) -> bool {
         let size = cell_size * self.parts();
         match woo(size, density, primitives) {
             Some(resolution) if resolution.iter().all(|&r| r <= MAX_RESOLUTION) => {

@@ -191,9 +191,9 @@ impl Inside<'_> {
         let mut density = f64::from(density);
         let mut frame = self.grid.frame;
         loop {
-            let is_cut = frame.cut(self.lattice.cell_size(), density, count);
+            let is_refined = frame.refine(self.lattice.cell_size(), density, count);
             density *= 0.5;
-            if !is_cut {
+            if !is_refined {
                 continue;
             }
             if frame.resolution == self.grid.frame.resolution {
