@@ -8,7 +8,7 @@
 //! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
 //! scatter   each triangle's entry into its bin                                  (scatter.rs)
-//! roots     bins sorted and split into subtrees                                 (roots.rs, subtree.rs)
+//! subtrees  bins sorted and split into subtrees                                 (subtrees.rs, subtree.rs)
 //! top       a tree over the subtrees                                            (top.rs)
 //!
 //! index   | header | ids (first the keys, then centres) | nodes: root | subtrees of all tasks (first centres) | top |
@@ -22,9 +22,9 @@
 //! puts the keys there, too, if they do not fit into the index: an index of exact size has no room for keys of
 //! triangles that are skipped.
 //!
-//! Each step but the last is cut into tasks: the passes by triangles, the roots by units. The tree does not depend on
-//! the number of tasks: a bin has its entries in the order of their ids, and subtrees end up side by side in the order
-//! of the units, those of crowded bins first.
+//! Each step but the last is cut into tasks: the passes by triangles, the subtrees by units. The tree does not depend
+//! on the number of tasks: a bin has its entries in the order of their ids, and subtrees end up side by side in the
+//! order of the units, those of crowded bins first.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -47,10 +47,10 @@ use super::layout::{
     small_spare,
 };
 use super::node::{Node, least_node};
-use super::roots::{RECORD, RootRecord, Roots};
 use super::sah::{Item, item};
 use super::scatter::{place_tasks, scatter};
 use super::subtree::Subtree;
+use super::subtrees::{RECORD, RootRecord, Subtrees};
 use super::top::{self, ITEM, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
@@ -149,7 +149,7 @@ fn header_of(
 /// The progress at which each step of a build begins, as an approximate fraction.
 const CENSUS: f32 = 0.02;
 const SCATTER: f32 = 0.15;
-const ROOTS: f32 = 0.25;
+const SUBTREES: f32 = 0.25;
 const TOP: f32 = 0.8;
 
 /// Builds everything but the header, which it returns. Without an index it only computes the size.
@@ -226,20 +226,20 @@ fn build_in(
     scatter(keys, entries, counts, bits, control)?;
 
     // Split bins into subtrees.
-    watch.at(ROOTS)?;
+    watch.at(SUBTREES)?;
     let (ids, nodes) = cut_index(&mut index, finite);
     let bounds = Lattice::pad(&bounds);
     let (least, shift) = (least_node(&bounds), KEY_BITS - bits);
     let work = BuildInputs { mesh, bounds, least, sizes, shift };
-    let roots = if IS_SMALL || tasks == 1 {
-        work.roots(entries, &mut *spare, ids, nodes, counts, watch)?
+    let totals = if IS_SMALL || tasks == 1 {
+        work.subtrees(entries, &mut *spare, ids, nodes, counts, watch)?
     } else {
-        work.roots_of_tasks(entries, &mut *spare, ids, nodes, counts, control)?
+        work.subtrees_of_tasks(entries, &mut *spare, ids, nodes, counts, control)?
     };
 
     // Build the tree on top of them.
     watch.at(TOP)?;
-    let tree = work.top(entries, spare, nodes, &roots);
+    let tree = work.top(entries, spare, nodes, &totals);
     let contents = tree.ok_or(index_error(fast_bound(triangles, 1).0))?;
     finish(mesh, Quality::Fast, bounds, index, finite, contents)
 }
@@ -331,7 +331,7 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
         let Self { work, range, entries, spare, ids, nodes, child, counts, mut goes_on } = self;
         let BuildInputs { mesh, least, sizes, shift, .. } = *work;
         let first = range.start as u32;
-        let mut roots = Roots {
+        let mut subtrees = Subtrees {
             mesh,
             least,
             entries,
@@ -344,7 +344,7 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
             subtree: &mut Subtree::new(),
             simd_level: SimdLevel::detect(),
             node_count: 0,
-            root_count: 0,
+            subtree_count: 0,
             last: RootRecord::new_zeroed(),
         };
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
@@ -352,7 +352,7 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
         for unit in units.take_while(|unit| unit.start < range.end) {
             debug_assert!(unit.start == end, "entries between units");
             end = unit.end;
-            roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
+            subtrees.unit(unit.start - range.start..unit.end - range.start, shift, 0);
             if !goes_on(end) {
                 // The build was cancelled: nothing that it made is used.
                 end = range.end;
@@ -360,14 +360,14 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
             }
         }
         debug_assert!(end == range.end, "the units of a task end elsewhere than its entries");
-        let made = Made { first, child, nodes: roots.node_count, roots: roots.root_count };
-        (made, roots.last)
+        let made = Made { first, child, nodes: subtrees.node_count, roots: subtrees.subtree_count };
+        (made, subtrees.last)
     }
 }
 
 impl BuildInputs<'_> {
     /// Makes the subtrees and their records in one task. `spare` may be shorter than the entries.
-    fn roots(
+    fn subtrees(
         &self,
         entries: &mut [Entry],
         spare: &mut [Entry],
@@ -380,7 +380,7 @@ impl BuildInputs<'_> {
         let (range, child, all) = (0..entries.len(), 1, entries.len() as u32);
         let mut result = Ok(());
         let goes_on = |done: usize| {
-            result = watch.between(done as u32, all, [ROOTS, TOP]);
+            result = watch.between(done as u32, all, [SUBTREES, TOP]);
             result.is_ok()
         };
         // Empty `nodes` are legal: nodes are only counted then.
@@ -392,9 +392,9 @@ impl BuildInputs<'_> {
         Ok(TaskTotals { nodes: 1 + made.nodes, roots: made.roots, last })
     }
 
-    /// [`roots`](Self::roots) with several tasks. Out of line: their results take stack.
+    /// [`subtrees`](Self::subtrees) with several tasks. Out of line: their results take stack.
     #[inline(never)]
-    fn roots_of_tasks(
+    fn subtrees_of_tasks(
         &self,
         entries: &mut [Entry],
         spare: &mut [Entry],

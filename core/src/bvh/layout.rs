@@ -7,16 +7,16 @@
 //!
 //! The bounds of quality `fast` depend on the number `n` of triangles alone ([`high`](super::high) has its own):
 //!
-//! - A node of a subtree has eight children, or none that are nodes. So a root over `m` triangles has no more than
-//!   (m - 1) / 7 nodes below it ([`subtree`](super::subtree)).
+//! - A node of a subtree has eight children, or none that are nodes. So a subtree over `m` triangles has no more than
+//!   (m - 1) / 7 nodes below its root ([`subtree`](super::subtree)).
 //! - Let `R` be the number of roots. Above them, `a` nodes have eight children. `b` nodes have fewer, and all their
-//!   children are roots. Then `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So a root costs at most
+//!   children are roots. Then `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. So each root costs at most
 //!   1 + 4/7 = 11/7 nodes, itself included.
-//! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
-//!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
-//!   again by halving its entries ([`most_of_root`]).
-//! - A unit may have too few triangles for a root if it is the last one behind the crowded bins, or the last one of a
-//!   division of a crowded bin. Each such unit adds one root. A crowded bin has more than [`CROWD`] triangles, and
+//! - There is no more than one subtree for [`TRIANGLES_PER_SUBTREE`] triangles ([`units`](super::units)). The rest of
+//!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a subtree that would have more is built
+//!   again by halving its entries ([`most_of_subtree`]).
+//! - A unit may have too few triangles for a subtree if it is the last one behind the crowded bins, or the last one of
+//!   a division of a crowded bin. Each such unit adds one subtree. A crowded bin has more than [`CROWD`] triangles, and
 //!   divisions nest at most [`DIVISIONS`] deep.
 //!
 //! Each bin has a count for every task and one in total, and there is at most one bin for sixteen triangles, or a
@@ -28,11 +28,11 @@
 //! 16 n + 640, and `HGRID_SCRATCH_BOUND`, 17 n + 320; a test compares them for many `n`):
 //!
 //! ```text
-//! late roots <= 5 n / 4097 + 1                      behind crowded bins, see above
+//! late       <= 5 n / 4097 + 1                      subtrees behind crowded bins, see above
 //! nodes      <= 0.14625 n + 1 + 11 late / 7 + 3     1 as the first term is rounded up; 3 are to spare
 //! fine       <= n / 2048                             none below 2048 triangles
 //! index       = 128 + 4 n + 80 nodes + 196 fine, and paddings of at most 60, 48 and 60
-//!            <= 15.7 n + 636                        n < 2048: one late root, for which 11 / 7 is rounded down to 1
+//!            <= 15.7 n + 636                        n < 2048: one is late, and 11 / 7 is rounded down to 1
 //!            <= 15.8 n + 696 <= 16 n + 640          n < 4097: the same
 //!            <= 15.96 n + 742 <= 16 n + 640         otherwise
 //! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 60; one bin, or 16 triangles or more a bin
@@ -45,24 +45,24 @@ use crate::blob::HEADER_BYTES;
 use super::fine::FineSides;
 use super::node::Node;
 
-/// Levels of nodes, at most. Quality `fast` makes up to 47: 20 by SAH and 9 that halve roots ([`top`](super::top)), and
-/// 18 of a subtree, which has at most 18 nodes ([`subtree`](super::subtree)). Quality `high` makes up to 35
-/// ([`high`](super::high)). The rest is reserve.
+/// Levels of nodes, at most. Quality `fast` makes up to 47: 20 by SAH and 9 that halve ranges of roots
+/// ([`top`](super::top)), and 18 of a subtree, which has at most 18 nodes ([`subtree`](super::subtree)). Quality `high`
+/// makes up to 35 ([`high`](super::high)). The rest is reserve.
 pub(crate) const LEVELS: u32 = 64;
 
-/// Triangles for each root, at least, on average.
-pub(crate) const TRIANGLES_PER_ROOT: usize = 24;
+/// Triangles for each subtree, at least, on average.
+pub(crate) const TRIANGLES_PER_SUBTREE: usize = 24;
 
-/// Triangles of a root, at most.
-pub(crate) const MOST_ROOT: usize = 128;
+/// Triangles of a subtree, at most.
+pub(crate) const MOST_SUBTREE: usize = 128;
 
-/// Triangles of each root of a unit that has more than [`MOST_ROOT`], at least.
+/// Triangles of each subtree of a unit that has more than [`MOST_SUBTREE`], at least.
 pub(crate) const LEAST_PIECE: usize = 32;
 
-const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
+const _: () = assert!(TRIANGLES_PER_SUBTREE <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_SUBTREE);
 
 /// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost: 0.14625, or
-/// 11.7 bytes. With 4 bytes of ids, 0.16 of late roots and 0.1 of fine sides an index takes less than 16 bytes a
+/// 11.7 bytes. With 4 bytes of ids, 0.16 of late subtrees and 0.1 of fine sides an index takes less than 16 bytes a
 /// triangle.
 const NODES_PER_TRIANGLE: u32 = 2457;
 /// A multiple of 7 * 24, so that 11/7 nodes for 24 triangles are a whole number of parts.
@@ -71,20 +71,20 @@ const WHOLE: u32 = 16_800;
 /// The part of [`NODES_PER_TRIANGLE`] for the nodes below the roots.
 #[expect(clippy::cast_possible_truncation, reason = "a small constant")]
 const NODES_PER_TRIANGLE_BELOW: u32 =
-    NODES_PER_TRIANGLE - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u32;
+    NODES_PER_TRIANGLE - WHOLE * 11 / 7 / TRIANGLES_PER_SUBTREE as u32;
 
-/// The most nodes below a root of so many triangles.
-pub(crate) const fn most_of_root(triangles: usize) -> usize {
-    debug_assert!(triangles <= MOST_ROOT, "too many triangles for a root");
+/// The most nodes below the root of a subtree of so many triangles.
+pub(crate) const fn most_of_subtree(triangles: usize) -> usize {
+    debug_assert!(triangles <= MOST_SUBTREE, "too many triangles for a subtree");
     NODES_PER_TRIANGLE_BELOW as usize * triangles / WHOLE as usize
 }
 
 /// Bins with more entries are crowded: they come first. Those with more than [`MOST_UNIT`] are divided.
 pub(crate) const CROWD: usize = 4096;
 
-/// Entries of a unit of bins that is not divided, at most: a bin, and before and behind it fewer entries than a root
+/// Entries of a unit of bins that is not divided, at most: a bin, and before and behind it fewer entries than a subtree
 /// needs.
-pub(crate) const MOST_UNIT: usize = CROWD + 2 * TRIANGLES_PER_ROOT;
+pub(crate) const MOST_UNIT: usize = CROWD + 2 * TRIANGLES_PER_SUBTREE;
 
 /// Divisions of a bin inside one another, at most.
 pub(crate) const DIVISIONS: u32 = 5;
@@ -108,9 +108,9 @@ pub(crate) const fn bin_bits(triangles: u64) -> u32 {
     bits
 }
 
-/// Roots behind crowded bins, at most.
+/// Subtrees behind crowded bins, at most.
 #[expect(clippy::cast_possible_truncation, reason = "a small constant")]
-const fn late_roots(triangles: u32) -> u32 {
+const fn late_subtrees(triangles: u32) -> u32 {
     DIVISIONS * (triangles / (CROWD as u32 + 1)) + 1
 }
 
@@ -120,7 +120,7 @@ const fn parts_of(triangles: u32, parts: u32) -> u32 {
     triangles / WHOLE * parts + (triangles % WHOLE * parts).div_ceil(WHOLE)
 }
 
-/// The most nodes below the roots that hold so many triangles.
+/// The most nodes below the roots of subtrees that hold so many triangles.
 pub(crate) const fn most_below(triangles: u32) -> u32 {
     parts_of(triangles, NODES_PER_TRIANGLE_BELOW)
 }
@@ -128,7 +128,7 @@ pub(crate) const fn most_below(triangles: u32) -> u32 {
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u32) -> u32 {
     // Three are to spare.
-    parts_of(triangles, NODES_PER_TRIANGLE) + 11 * late_roots(triangles) / 7 + 3
+    parts_of(triangles, NODES_PER_TRIANGLE) + 11 * late_subtrees(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids, nodes and fine sides.

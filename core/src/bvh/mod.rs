@@ -17,7 +17,7 @@
 //!
 //! ```text
 //! format         node, fine, layout, validate
-//! build          build: census (key), scatter, units, crowd, sort, roots (subtree), top, index; high/ for `high`;
+//! build          build: census (key), scatter, units, crowd, sort, subtrees (subtree), top, index; high/ for `high`;
 //!                parts (sah) for top and high/
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays (per_ray), group (boxes, met, group_leaf), interleave
@@ -33,8 +33,8 @@
 //! - A *unit* is a bin, or several that follow one another, whose entries are split into subtrees together ([`units`]).
 //! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own. With more than
 //!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres ([`crowd`]).
-//! - A *root* is the top node of a subtree; the subtree itself is called so, too ([`roots`]). The top node of the
-//!   whole tree is called the root of the tree.
+//! - A *subtree* holds the entries of a part of a unit ([`subtrees`]). A *root* is the top node of a subtree; the top
+//!   node of the whole tree is called the root of the tree.
 //! - A *seam* is a place between units where a task may end ([`units::is_seam`]).
 //!
 //! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011; SAH in bins,
@@ -62,7 +62,6 @@ mod parts;
 mod per_ray;
 mod rays;
 mod refit;
-mod roots;
 mod sah;
 mod scatter;
 mod search;
@@ -71,6 +70,7 @@ mod slab;
 mod sort;
 mod stack;
 mod subtree;
+mod subtrees;
 mod top;
 mod units;
 mod validate;

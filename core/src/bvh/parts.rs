@@ -109,7 +109,7 @@ impl Splitter {
             parts.replace(part, range.start + count, boxes, self.length_scale);
         }
         if parts.count == 1 {
-            // Only a range that is small from the start is not split: that of a root over few triangles.
+            // Only a range that is small from the start is not split: that of a tree over few items.
             let all = items.get(range.start as usize..range.end as usize);
             parts.boxes[0] = box_around(all.or_bug("a range behind the items").unwrap_or_default());
         }

@@ -21,10 +21,10 @@
 //! only node. So m >= 8 a - (a + b - 1) + 9 b, and a + b <= (m - 1 - b) / 7. A subtree with too many nodes for the
 //! memory bound is split again, by halves only.
 //!
-//! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
+//! All triangles of a subtree are read in one loop, so that their loads from memory overlap. A branch on the
 //! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
 
-#![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
+#![expect(clippy::cast_possible_truncation, reason = "no more than MOST_SUBTREE triangles")]
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x64};
@@ -37,17 +37,17 @@ use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::simd::{HAS_VECTORS, Kernel};
 
-use super::layout::{Entry, MOST_ROOT, most_of_root};
+use super::layout::{Entry, MOST_SUBTREE, most_of_subtree};
 use super::node::{LEAF, Node, SMALL_LEAF, Sides, WIDTH, corners};
 
 /// Nodes of a subtree, at most, and one to spare.
-const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
+const MOST_NODES: usize = MOST_SUBTREE / (WIDTH - 1) + 1;
 
 /// The boxes of nodes lie behind those of triangles in [`Subtree::boxes`].
-const OF_NODES: usize = MOST_ROOT;
-const BOXES: usize = MOST_ROOT + MOST_NODES;
+const OF_NODES: usize = MOST_SUBTREE;
+const BOXES: usize = MOST_SUBTREE + MOST_NODES;
 
-const _: () = assert!(MOST_NODES <= MOST_ROOT && LEAF <= 8);
+const _: () = assert!(MOST_NODES <= MOST_SUBTREE && LEAF <= 8);
 
 /// The nodes of a subtree, the root first, each behind its parent.
 pub(crate) struct Subtree {
@@ -64,12 +64,12 @@ pub(crate) struct Subtree {
     /// The boxes of the triangles, then those of the nodes.
     boxes: [Sides; BOXES],
     /// The ids of the entries, and room to read eight from any of them.
-    sources: [u32; MOST_ROOT + LEAF],
+    sources: [u32; MOST_SUBTREE + LEAF],
     /// The ids of the leaves, one leaf behind the other, and room to write eight behind any of them.
-    ids: [u32; MOST_ROOT + LEAF],
+    ids: [u32; MOST_SUBTREE + LEAF],
     id_count: usize,
     /// One more than the highest bit in which the keys of entries `i` and `i + 1` differ, or 0.
-    changes: [u8; MOST_ROOT],
+    changes: [u8; MOST_SUBTREE],
     /// For each number, its places in `changes`, as bits. Only entries of numbers that occur are up to date.
     places: [u128; 32],
 }
@@ -96,7 +96,7 @@ struct EntryRange {
     end: u8,
 }
 
-const _: () = assert!(MOST_ROOT <= u8::MAX as usize && MOST_ROOT == 128);
+const _: () = assert!(MOST_SUBTREE <= u8::MAX as usize && MOST_SUBTREE == 128);
 
 impl EntryRange {
     const NONE: Self = Self { start: 0, end: 0 };
@@ -106,9 +106,9 @@ impl EntryRange {
     }
 }
 
-/// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids lie in the index from `first` on, the nodes
-/// below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the tree. Where splits by keys
-/// make more nodes than the layout has room for, ranges are halved.
+/// Makes the nodes over some entries, no more than [`MOST_SUBTREE`]. Their ids lie in the index from `first` on, the
+/// nodes below the root from `child` on. `least` is [`least_node`](super::node::least_node) of the tree. Where splits
+/// by keys make more nodes than the layout has room for, ranges are halved.
 pub(crate) struct Build<'w> {
     pub(crate) subtree: &'w mut Subtree,
     pub(crate) mesh: &'w TriangleMesh<'w>,
@@ -126,12 +126,12 @@ impl Kernel for Build<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { subtree, mesh, entries, first, child, least, mut by } = self;
-        debug_assert!(entries.len() <= MOST_ROOT, "too many entries for a subtree");
-        let entries = entries.get(..entries.len().min(MOST_ROOT)).unwrap_or_default();
+        debug_assert!(entries.len() <= MOST_SUBTREE, "too many entries for a subtree");
+        let entries = entries.get(..entries.len().min(MOST_SUBTREE)).unwrap_or_default();
         subtree.read(simd, mesh, entries);
         loop {
             subtree.shape(simd, by);
-            if by == SplitRule::Halves || subtree.count <= 1 + most_of_root(entries.len()) {
+            if by == SplitRule::Halves || subtree.count <= 1 + most_of_subtree(entries.len()) {
                 break;
             }
             by = SplitRule::Halves;
@@ -155,10 +155,10 @@ impl Subtree {
             tops: [0; MOST_NODES],
             count: 0,
             boxes: [[0.0; 8]; BOXES],
-            sources: [0; MOST_ROOT + LEAF],
-            ids: [0; MOST_ROOT + LEAF],
+            sources: [0; MOST_SUBTREE + LEAF],
+            ids: [0; MOST_SUBTREE + LEAF],
             id_count: 0,
-            changes: [0; MOST_ROOT],
+            changes: [0; MOST_SUBTREE],
             places: [0; 32],
         }
     }
@@ -207,7 +207,7 @@ impl Subtree {
             low.combine(f32x4::splat(simd, 0.0) - high).store_slice(sides);
         }
         let count = entries.len();
-        self.changes = [0; MOST_ROOT];
+        self.changes = [0; MOST_SUBTREE];
         for (change, (one, next)) in
             self.changes.iter_mut().zip(entries.iter().zip(entries.iter().skip(1)))
         {
@@ -220,7 +220,7 @@ impl Subtree {
     #[inline(always)]
     fn shape<S: Simd>(&mut self, simd: S, by: SplitRule) {
         if by == SplitRule::Halves {
-            self.changes = [0; MOST_ROOT];
+            self.changes = [0; MOST_SUBTREE];
         }
         let bits = if HAS_VECTORS { self.find_places(simd) } else { self.find_places_one_by_one() };
         (self.count, self.id_count) = (1, 0);
@@ -466,7 +466,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::bvh::layout::most_of_root;
+    use crate::bvh::layout::most_of_subtree;
     use crate::bvh::node::Child;
     use crate::random;
     use crate::simd::{SimdLevel, dispatch};
@@ -509,7 +509,7 @@ mod tests {
 
     #[test]
     fn every_triangle_stands_in_one_leaf() {
-        let (positions, indices) = mesh(MOST_ROOT);
+        let (positions, indices) = mesh(MOST_SUBTREE);
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();
         // Far apart, equal, each half of the one before, and in no order.
         let keys: [fn(u32) -> u32; 4] = [
@@ -519,7 +519,7 @@ mod tests {
             |i| i.wrapping_mul(0x9e37) & 0xfff,
         ];
         let mut subtree = Subtree::new();
-        for count in (0..=MOST_ROOT).step_by(if cfg!(miri) { 41 } else { 1 }) {
+        for count in (0..=MOST_SUBTREE).step_by(if cfg!(miri) { 41 } else { 1 }) {
             for (which, key) in keys.iter().enumerate() {
                 let mut entries: Vec<Entry> = (0..count as u32).map(|id| [key(id), id]).collect();
                 if which < 3 {
@@ -536,7 +536,7 @@ mod tests {
                     let most = (count.saturating_sub(1) / 7).max(1);
                     assert!(subtree.below().len() < most, "{count} {which} {by:?}");
                     // Halves are cheap enough for the bound.
-                    assert!(subtree.below().len() <= most_of_root(count), "{count} {which}");
+                    assert!(subtree.below().len() <= most_of_subtree(count), "{count} {which}");
                 }
             }
         }
@@ -566,7 +566,7 @@ mod tests {
         for most in [1, 2, 9, 31] {
             let mut subtree = Subtree::new();
             subtree.changes =
-                [(); MOST_ROOT].map(|()| ((random::next(&mut state) >> 8) % most) as u8);
+                [(); MOST_SUBTREE].map(|()| ((random::next(&mut state) >> 8) % most) as u8);
             let bits = subtree.find_places_one_by_one();
             let expected = of_bits(&subtree, bits);
             for level in SimdLevel::available() {

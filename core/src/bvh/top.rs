@@ -111,7 +111,7 @@ mod tests {
         let leaf = |record: u32| {
             (Node { first: record, counts: [1, 0, 0, 0, 0, 0, 0, 0], ..Node::EMPTY }, 1)
         };
-        // A root and its part of the nodes above are 11 / 7 nodes (the layout proves it).
+        // A root and its share of the nodes above are 11 / 7 nodes (the layout proves it).
         let mut nodes = vec![Node::EMPTY; boxes.len() * 11 / 7];
         let mut fine = FineList::new(&mut []);
         let top = build(&mut items, &bounds, leaf, &mut nodes, 1000, &mut fine).unwrap();

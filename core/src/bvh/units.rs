@@ -1,19 +1,19 @@
-//! Groups bins into units, each of which is split into roots by itself.
+//! Groups bins into units, each of which is split into subtrees by itself.
 //!
-//! A unit should be a single bin: neighbours in Morton order may lie far apart, and a root over both has a large box.
-//! But the memory bound allows only one root for [`TRIANGLES_PER_ROOT`] triangles. A running balance keeps to it.
+//! A unit should be a single bin: neighbours in Morton order may lie far apart, so a subtree over both has a large box.
+//! But the memory bound allows only one subtree for [`TRIANGLES_PER_SUBTREE`] triangles. A running balance keeps to it.
 //!
 //! ```text
 //! each crowded bin is a unit; balance = 0
 //! for each other bin: add it to the unit
-//!     left = balance + triangles of the unit - TRIANGLES_PER_ROOT * its roots; at a seam, at most 0
-//!     if left is not negative, and no bin follows or left and the rest are enough for a root: end the unit,
+//!     left = balance + triangles of the unit - TRIANGLES_PER_SUBTREE * its subtrees; at a seam, at most 0
+//!     if left is not negative, and no bin follows or left and the rest are enough for a subtree: end the unit,
 //!         balance = left
 //! ```
 
 use core::ops::Range;
 
-use super::layout::{CROWD, LEAST_PIECE, MOST_ROOT, TRIANGLES_PER_ROOT};
+use super::layout::{CROWD, LEAST_PIECE, MOST_SUBTREE, TRIANGLES_PER_SUBTREE};
 
 /// Returns the places at which the entries of crowded bins start, and those of the others: crowded bins come
 /// first, so that the others lie side by side.
@@ -21,21 +21,21 @@ pub(crate) fn starts(sizes: &[u32]) -> [u32; 2] {
     [0, sizes.iter().filter(|&&size| size as usize > CROWD).sum()]
 }
 
-/// The balance: triangles that count towards further roots.
+/// The balance: triangles that count towards further subtrees.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RootBudget(usize);
+pub(crate) struct SubtreeBudget(usize);
 
-impl RootBudget {
-    /// Subtracts the roots of a unit from the balance and returns true; returns false if the balance is too small, or
-    /// would be too small for a root over the `rest` entries behind the unit.
-    pub(crate) fn take_roots(&mut self, unit: &Range<usize>, rest: usize) -> bool {
+impl SubtreeBudget {
+    /// Subtracts the subtrees of a unit from the balance and returns true. Returns false if the balance is too small,
+    /// or would be too small for a subtree over the `rest` entries behind the unit.
+    pub(crate) fn take_subtrees(&mut self, unit: &Range<usize>, rest: usize) -> bool {
         let count = unit.len();
-        let roots = if count > MOST_ROOT { count / LEAST_PIECE } else { 1 };
-        let Some(left) = (self.0 + count).checked_sub(roots * TRIANGLES_PER_ROOT) else {
+        let subtrees = if count > MOST_SUBTREE { count / LEAST_PIECE } else { 1 };
+        let Some(left) = (self.0 + count).checked_sub(subtrees * TRIANGLES_PER_SUBTREE) else {
             return false;
         };
         let left = if is_seam(unit) { 0 } else { left };
-        let is_enough = rest == 0 || left + rest >= TRIANGLES_PER_ROOT;
+        let is_enough = rest == 0 || left + rest >= TRIANGLES_PER_SUBTREE;
         if is_enough {
             self.0 = left;
         }
@@ -43,7 +43,7 @@ impl RootBudget {
     }
 }
 
-/// Returns true if a task may end behind this unit. The balance starts again behind it, so that the roots of a task
+/// Returns true if a task may end behind this unit. The balance starts again behind it, so that the subtrees of a task
 /// depend on its own triangles alone.
 pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
     unit.end - unit.start > CROWD || unit.start / SEAM != unit.end / SEAM
@@ -53,14 +53,14 @@ pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
 pub(crate) const SEAM: usize = 16_384;
 
 /// The units of some bins, given how many entries each bin has: first each crowded bin, then the
-/// others, gathered until the balance is enough for their root. The rest belongs to the last unit.
+/// others, gathered until the balance is enough for a subtree. The rest belongs to the last unit.
 #[derive(Clone)]
 pub(crate) struct Units<'s> {
     sizes: &'s [u32],
     bin: usize,
     is_crowded: bool,
     start: usize,
-    budget: RootBudget,
+    budget: SubtreeBudget,
     /// Entries of all bins.
     all: usize,
 }
@@ -68,7 +68,7 @@ pub(crate) struct Units<'s> {
 impl<'s> Units<'s> {
     pub(crate) fn new(sizes: &'s [u32]) -> Self {
         let all = sizes.iter().map(|&size| size as usize).sum();
-        Self { sizes, bin: 0, is_crowded: true, start: 0, budget: RootBudget::default(), all }
+        Self { sizes, bin: 0, is_crowded: true, start: 0, budget: SubtreeBudget::default(), all }
     }
 
     /// The size of the next crowded bin; after the last one, of the next other bin.
@@ -98,7 +98,7 @@ impl Iterator for Units<'_> {
         let mut end = start;
         while let Some(size) = self.next_bin() {
             end += size;
-            if size > CROWD || self.budget.take_roots(&(start..end), self.all - end) {
+            if size > CROWD || self.budget.take_subtrees(&(start..end), self.all - end) {
                 break;
             }
         }
@@ -113,7 +113,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::bvh::layout::{DIVISIONS, MOST_UNIT, most_nodes, most_of_root};
+    use crate::bvh::layout::{DIVISIONS, MOST_UNIT, most_nodes, most_of_subtree};
     use crate::random;
 
     /// The units of some bins, of which each holds what the layout promises.
@@ -132,14 +132,14 @@ mod tests {
             if is_crowded {
                 continue;
             }
-            // Every root has its share of triangles, unless it is the only one or the last one behind crowded bins.
-            let roots = if unit.len() > MOST_ROOT { unit.len() / LEAST_PIECE } else { 1 };
+            // Every subtree has its share of triangles, unless it is the only one or the last one behind crowded bins.
+            let subtrees = if unit.len() > MOST_SUBTREE { unit.len() / LEAST_PIECE } else { 1 };
             let is_last = unit.end == all && (units.len() == 1 || others > 0);
             assert!(
-                balance + unit.len() >= roots * TRIANGLES_PER_ROOT || is_last,
+                balance + unit.len() >= subtrees * TRIANGLES_PER_SUBTREE || is_last,
                 "{sizes:?}: {units:?}"
             );
-            balance = (balance + unit.len()).saturating_sub(roots * TRIANGLES_PER_ROOT);
+            balance = (balance + unit.len()).saturating_sub(subtrees * TRIANGLES_PER_SUBTREE);
             // The balance starts again behind a seam.
             balance = if is_seam(unit) { 0 } else { balance };
         }
@@ -148,24 +148,25 @@ mod tests {
     }
 
     /// The bound of [`layout`](crate::bvh::layout) has room for the most nodes that its rules allow. Each crowd here is
-    /// divided [`DIVISIONS`] times. Each division but the last leaves one triangle behind a crowded bin: a root by
-    /// itself. The last one makes roots with as many nodes below them as the budget allows. Above the roots are 4/7
-    /// nodes for each.
+    /// divided [`DIVISIONS`] times. Each division but the last leaves one triangle behind a crowded bin: a subtree by
+    /// itself. The last one makes subtrees with as many nodes as the budget allows. Above their roots are 4/7 nodes for
+    /// each.
     #[test]
-    fn the_bound_has_room_for_roots_behind_crowded_bins() {
+    fn the_bound_has_room_for_subtrees_behind_crowded_bins() {
         const CROWDS: usize = 100;
         const INSIDE: usize = MOST_UNIT + 1;
         let late = DIVISIONS as usize - 1;
-        let (mut budget, mut start, mut roots, mut below) = (RootBudget::default(), 0, late, 0);
+        let (mut budget, mut start) = (SubtreeBudget::default(), 0);
+        let (mut roots, mut below) = (late, 0);
         while start < INSIDE {
             // The fewest triangles with a node below their root, and with two nodes.
             let fits = |&end: &usize| {
-                end <= INSIDE && budget.clone().take_roots(&(start..end), INSIDE - end)
+                end <= INSIDE && budget.clone().take_subtrees(&(start..end), INSIDE - end)
             };
             let end = [start + 13, start + 25].into_iter().find(fits).unwrap_or(INSIDE);
-            budget.take_roots(&(start..end), INSIDE - end);
+            budget.take_subtrees(&(start..end), INSIDE - end);
             (roots, below) =
-                (roots + 1, below + most_of_root(end - start).min((end - start - 1) / 7));
+                (roots + 1, below + most_of_subtree(end - start).min((end - start - 1) / 7));
             start = end;
         }
         let triangles = u32::try_from(CROWDS * (INSIDE + late)).unwrap();
@@ -176,35 +177,35 @@ mod tests {
 
     #[expect(clippy::cast_possible_truncation, reason = "small")]
     #[test]
-    fn there_are_triangles_for_each_root() {
-        let (per_root, crowd) = (TRIANGLES_PER_ROOT as u32, CROWD as u32);
+    fn there_are_triangles_for_each_subtree() {
+        let (least, crowd) = (TRIANGLES_PER_SUBTREE as u32, CROWD as u32);
         assert_eq!(units(&[]), []);
         assert_eq!(units(&[0, 0, 0]), []);
         assert_eq!(units(&[0, 1, 0]), vec![0..1]);
-        assert_eq!(units(&[per_root, per_root]).len(), 2);
+        assert_eq!(units(&[least, least]).len(), 2);
         // A bin with too few triangles joins the next one, and so does one before too few.
-        assert_eq!(units(&[1, per_root]).len(), 1);
-        assert_eq!(units(&[per_root, per_root - 1]).len(), 1);
-        assert_eq!(units(&[per_root - 1, 1, per_root]).len(), 2);
+        assert_eq!(units(&[1, least]).len(), 1);
+        assert_eq!(units(&[least, least - 1]).len(), 1);
+        assert_eq!(units(&[least - 1, 1, least]).len(), 2);
         // The triangles that a large bin has to spare count for small bins behind it.
-        assert_eq!(units(&[3 * per_root, 1, 0, 2, per_root - 3]).len(), 4);
-        assert_eq!(units(&[per_root, 3 * per_root, 1, 0, 2, per_root - 3]).len(), 5);
-        // Bins that are split into several roots have fewer to spare.
+        assert_eq!(units(&[3 * least, 1, 0, 2, least - 3]).len(), 4);
+        assert_eq!(units(&[least, 3 * least, 1, 0, 2, least - 3]).len(), 5);
+        // Bins that are split into several subtrees have fewer to spare.
         assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
-        assert_eq!(units(&[crowd, per_root, crowd]).len(), 3);
-        // One triangle more than a single root takes makes four, which leave less for small bins.
-        assert_eq!(units(&[MOST_ROOT as u32, 1, 1, per_root]).len(), 4);
-        assert_eq!(units(&[MOST_ROOT as u32 + 1, 1, 1, per_root]).len(), 3);
+        assert_eq!(units(&[crowd, least, crowd]).len(), 3);
+        // One triangle more than a single subtree takes makes four, which leave less for small bins.
+        assert_eq!(units(&[MOST_SUBTREE as u32, 1, 1, least]).len(), 4);
+        assert_eq!(units(&[MOST_SUBTREE as u32 + 1, 1, 1, least]).len(), 3);
         // Crowded bins come first, and the small rest is a unit of its own.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
         // The balance starts again behind a seam, so a rest behind one joins what lies before it.
-        assert_eq!(units(&[per_root - 1, crowd, per_root - 1]).len(), 1);
+        assert_eq!(units(&[least - 1, crowd, least - 1]).len(), 1);
         let mut state = 1_u32;
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
             let mut sizes = [0; 64];
             for size in &mut sizes {
-                let some = [0, 1, per_root - 1, per_root, 100, crowd, crowd + 1, 5000];
+                let some = [0, 1, least - 1, least, 100, crowd, crowd + 1, 5000];
                 *size = some[(random::next(&mut state) >> 29) as usize];
             }
             units(&sizes);

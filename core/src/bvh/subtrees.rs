@@ -1,8 +1,8 @@
-//! From bins of entries to roots: subtrees over up to `MOST_ROOT` triangles each. The tree on top
-//! ([`top`](super::top)) treats each as one item.
+//! From bins of entries to subtrees over up to `MOST_SUBTREE` triangles each. The tree on top ([`top`](super::top))
+//! treats each as one item.
 //!
 //! ```text
-//! for each unit (a crowded bin, or bins side by side with enough triangles for their roots):
+//! for each unit (a crowded bin, or bins side by side with enough triangles for a subtree):
 //!     too large to sort: new keys in the box around its centres, new bins; then their units
 //!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
@@ -16,7 +16,7 @@
 //! needed any more, and the same memory is the second buffer when they are sorted by bins.
 //!
 //! The record of a root is 112 bytes, written over entries that were used up:
-//! [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
+//! [`TRIANGLES_PER_SUBTREE`](super::layout::TRIANGLES_PER_SUBTREE) of them for each subtree, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -34,12 +34,12 @@ use crate::tasks::take;
 use super::crowd::{self, CrowdPart, NewKeys, sort_by_bin};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
-    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, TRIANGLES_PER_ROOT, bin_bits,
+    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_SUBTREE, MOST_UNIT, TRIANGLES_PER_SUBTREE, bin_bits,
 };
 use super::node::{LEAF, Node, WIDTH};
 use super::sort::sort;
 use super::subtree::{Build, SplitRule, Subtree};
-use super::units::{RootBudget, starts};
+use super::units::{SubtreeBudget, starts};
 
 /// The record of a root: its node, its box and its counts.
 #[repr(C)]
@@ -57,7 +57,7 @@ pub(crate) struct RootRecord {
 /// A record in entries.
 pub(crate) const RECORD: usize = size_of::<RootRecord>() / size_of::<Entry>();
 
-const _: () = assert!(size_of::<RootRecord>() == 112 && RECORD <= TRIANGLES_PER_ROOT);
+const _: () = assert!(size_of::<RootRecord>() == 112 && RECORD <= TRIANGLES_PER_SUBTREE);
 
 impl RootRecord {
     /// Writes it to the start of some entries, if it has room there.
@@ -75,8 +75,8 @@ fn copy_what_fits<T: Copy>(from: &[T], to: Option<&mut [T]>) {
     }
 }
 
-/// The roots of a range of units.
-pub(crate) struct Roots<'w> {
+/// The subtrees of a range of units.
+pub(crate) struct Subtrees<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
     /// [`least_node`](super::node::least_node) of the tree.
     pub(crate) least: f32,
@@ -99,13 +99,13 @@ pub(crate) struct Roots<'w> {
     pub(super) simd_level: SimdLevel,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
-    pub(crate) root_count: u32,
+    pub(crate) subtree_count: u32,
     /// The record of the last root.
     pub(crate) last: RootRecord,
 }
 
-impl Roots<'_> {
-    /// Makes the roots of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
+impl Subtrees<'_> {
+    /// Makes the subtrees of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
     /// only in their lowest `shift` bits.
     pub(crate) fn unit(&mut self, range: Range<usize>, shift: u32, depth: u32) {
         debug_assert!(range.end <= self.entries.len(), "a unit behind the entries");
@@ -131,15 +131,15 @@ impl Roots<'_> {
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
             sort(self.simd_level, entries, spare, (32 - differing.leading_zeros()).max(shift));
         }
-        self.make_roots(range);
+        self.make_subtrees(range);
     }
 
-    /// Makes roots of the entries of a unit, which are sorted by key. A range of more than [`MOST_ROOT`] entries is
-    /// split in two: where the highest bit changes in which the keys of its ends differ, or in the middle if they are
-    /// equal. No part has fewer than [`LEAST_PIECE`] entries.
+    /// Makes subtrees of the entries of a unit, which are sorted by key. A range of more than [`MOST_SUBTREE`] entries
+    /// is split in two: where the highest bit changes in which the keys of its ends differ, or in the middle if they
+    /// are equal. No part has fewer than [`LEAST_PIECE`] entries.
     ///
     /// A unit that is still too large after [`DIVISIONS`] divisions is halved by ids, which makes worse boxes.
-    fn make_roots(&mut self, range: Range<usize>) {
+    fn make_subtrees(&mut self, range: Range<usize>) {
         // In order, this ends after at most one split for each bit of a key, and one for each halving.
         debug_assert!(
             self.entries
@@ -150,10 +150,10 @@ impl Roots<'_> {
         let mut start = range.start;
         while start < range.end {
             let mut end = range.end;
-            while end - start > MOST_ROOT {
+            while end - start > MOST_SUBTREE {
                 end = start + self.split(start..end);
             }
-            self.root(start..end);
+            self.make_subtree(start..end);
             start = end;
         }
     }
@@ -161,7 +161,7 @@ impl Roots<'_> {
     /// Splits a range in two and returns the length of the first part. No part has fewer than [`LEAST_PIECE`] entries.
     fn split(&self, range: Range<usize>) -> usize {
         let entries = self.entries.get(range).unwrap_or_default();
-        debug_assert!(entries.len() > MOST_ROOT, "too few entries to split");
+        debug_assert!(entries.len() > MOST_SUBTREE, "too few entries to split");
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
         let differing = first[0] ^ last[0];
         let middle = if differing == 0 {
@@ -174,11 +174,11 @@ impl Roots<'_> {
     }
 
     /// Makes the subtree of a few entries, and leaves a record of it.
-    fn root(&mut self, range: Range<usize>) {
+    fn make_subtree(&mut self, range: Range<usize>) {
         let count = range.len() as u32;
         let first = self.first + range.start as u32;
         let child = self.child + self.node_count;
-        debug_assert!(range.end <= self.entries.len(), "a root behind the entries");
+        debug_assert!(range.end <= self.entries.len(), "a subtree behind the entries");
         let Some(entries) = self.entries.get(range.clone()) else { return };
         // Make the subtree, and copy its ids and nodes to the index.
         let subtree = &mut *self.subtree;
@@ -195,21 +195,21 @@ impl Roots<'_> {
         let (min, max) = ([x, y, z], [-u, -v, -w]);
         let levels = self.subtree.levels();
         let record = RootRecord { node: *node, min, max, count, levels };
-        let start = self.root_count as usize * RECORD;
-        // The only root of a task may have fewer entries than its record takes.
-        let is_only = self.root_count == 0 && range.end == self.entries.len();
+        let start = self.subtree_count as usize * RECORD;
+        // The only subtree of a task may have fewer entries than its record takes.
+        let is_only = self.subtree_count == 0 && range.end == self.entries.len();
         debug_assert!(is_only || start + RECORD <= range.end, "a record over entries to come");
         record.write(self.entries.get_mut(start..));
         self.last = record;
-        self.root_count += 1;
+        self.subtree_count += 1;
     }
 
-    /// Bins a crowded unit by keys of its own, and makes the roots of its units.
+    /// Bins a crowded unit by keys of its own, and makes the subtrees of its units.
     fn divide(&mut self, range: Range<usize>, centers: &Aabb, depth: u32) {
         let bits = bin_bits(range.len() as u64).min(KEY_BITS);
         let shift = KEY_BITS - bits;
         self.bin(range.clone(), centers, bits);
-        let mut budget = RootBudget::default();
+        let mut budget = SubtreeBudget::default();
         let mut start = range.start;
         while start < range.end {
             let mut end = self.bin_end(start..range.end, shift);
@@ -217,7 +217,7 @@ impl Roots<'_> {
                 // Seams are counted from the first entry of the tree, not from that of this task.
                 let before = self.first as usize;
                 while end < range.end
-                    && !budget.take_roots(&(before + start..before + end), range.end - end)
+                    && !budget.take_subtrees(&(before + start..before + end), range.end - end)
                 {
                     end = self.bin_end(end..range.end, shift);
                 }
