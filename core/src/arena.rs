@@ -1,4 +1,4 @@
-//! The caller's memory: checked views of a region, and [`Block`], of which Rust callers make aligned regions.
+//! The caller's memory: checked views of a region, and [`Block`], from which Rust callers make aligned regions.
 //!
 //! There is no allocator here. A region is a slice of bytes that starts at a multiple of 64; a layout says at which
 //! byte each section starts, and the cast from bytes to words is checked (alignment and length), never assumed.

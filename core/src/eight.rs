@@ -111,8 +111,8 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
     [x, y, z]
 }
 
-/// Reads triangles of which [`WideMesh::corners`](crate::mesh::WideMesh::corners) cannot read all: those of
-/// joined meshes among them.
+/// Reads eight triangles, such as those of a joined mesh, if [`WideMesh::corners`](crate::mesh::WideMesh::corners)
+/// cannot read all of them.
 #[cold]
 #[inline(never)]
 fn read<'m>(

@@ -371,8 +371,8 @@ mod tests {
         (0..8).fold(0, |bits, lane| bits | u64::from(is_one(lane)) << lane)
     }
 
-    /// Checks that no lane drops what is hit, and that levels that fuse nothing drop what one ray alone drops. Returns
-    /// how many lanes of the others differ from that.
+    /// Checks that no lane drops a hit triangle. Levels without fused operations must drop the same as a single ray; of
+    /// the other levels, returns how many lanes differ from it.
     fn check_lanes(
         rays: &[Sample; 8],
         filters: &[LineFilter<f32>; 8],

@@ -188,8 +188,8 @@ mod tests {
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
     use crate::triangle::TriangleTest;
 
-    /// A ray against a triangle in all lanes, with its range as distances: whether it is met before the start, and
-    /// whether it is surely hit.
+    /// A ray against a triangle in all lanes, with its range as distances. Tells if the ray meets it before the start,
+    /// and if the ray surely hits it.
     #[derive(Clone, Copy)]
     struct InRange<'a>(&'a RayFilter, &'a Triangle, [f32; 2]);
 

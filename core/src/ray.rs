@@ -129,7 +129,7 @@ impl Hit {
     /// The hit that a batch writes for a ray that hits nothing.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 
-    /// A hit of which only the triangle is known: its `t` is the start of the ray.
+    /// A hit somewhere on a known triangle: its `t` is the start of the ray.
     #[inline(always)]
     pub(crate) const fn somewhere(ray: &Ray, primitive: u32) -> Self {
         Self { t: ray.t_min, u: 0.0, v: 0.0, primitive }

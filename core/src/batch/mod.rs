@@ -10,7 +10,7 @@
 //! ```text
 //! closest   the group finds the closest hit of each ray among all triangles; a miss or an opaque one is
 //!           the answer
-//! occluded  an opaque hit ends a ray and is the answer; of the others the group keeps the closest
+//! occluded  an opaque hit ends a ray and is the answer; else the group keeps the closest hit
 //! then      in the order of the rays: ask the filter about the hit of each that is left; if it rejects
 //!           the hit, go on behind it alone
 //! ```

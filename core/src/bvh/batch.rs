@@ -3,7 +3,7 @@
 //! ```text
 //! for each window of rays, as many as there is memory to sort:
 //!     sort them if they are scattered (order.rs)
-//!     for each 64: trace them as a group (group.rs), and those alone that it hands back; answer each in its place
+//!     for each 64: trace them as a group (group.rs), then those alone that it left; answer each ray
 //! ```
 
 use super::Bvh;
@@ -67,10 +67,8 @@ impl<C: Together> Groups<'_, C> {
                     } else if batch.keeps_order()
                         && let Some(order) = &mut order
                     {
-                        order.defer(
-                            place - first,
-                            if is_alone { INVALID_ID } else { hit.primitive },
-                        );
+                        let id = if is_alone { INVALID_ID } else { hit.primitive };
+                        order.defer(place - first, id);
                     } else if is_alone {
                         batch.alone(place);
                     } else {

@@ -14,7 +14,7 @@
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
-//! A group may hold any rays: those of a camera share most nodes, those from a surface the first ones.
+//! A group may hold any rays. Camera rays share most nodes; rays from a surface share those at the top.
 
 use fearless_simd::Simd;
 
@@ -274,7 +274,7 @@ mod tests {
     use crate::samples::Random;
     use crate::simd::dispatch;
 
-    /// Prepares rays of which the last starts elsewhere than the others.
+    /// Prepares rays that start at one point, except for the last.
     struct Prepared<'a>(&'a mut Rays, f32);
 
     impl Kernel for Prepared<'_> {

@@ -167,7 +167,7 @@ struct Refitted {
 }
 
 impl Tree<'_> {
-    /// Writes the boxes of all nodes, of which there are so many levels.
+    /// Writes the boxes of all nodes, in a tree of so many levels.
     fn refit(&mut self, simd_level: SimdLevel, levels: u32) -> Refitted {
         if levels <= FEW_LEVELS {
             dispatch(simd_level, RefitNodes::<{ FEW_LEVELS as usize }>(self))

@@ -364,11 +364,8 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(items, bins) = self;
             let centers = box_of_centers(simd, items).into();
-            (
-                centers,
-                SplitInTwo { items, most_bins: MOST_BINS, length_scale: LENGTH_SCALE, bins }
-                    .run(simd),
-            )
+            let (most_bins, length_scale) = (MOST_BINS, LENGTH_SCALE);
+            (centers, SplitInTwo { items, most_bins, length_scale, bins }.run(simd))
         }
     }
 

@@ -116,7 +116,7 @@ mod tests {
     use crate::bvh::layout::{DIVISIONS, MOST_UNIT, most_nodes, most_of_subtree};
     use crate::random;
 
-    /// The units of some bins, of which each holds what the layout promises.
+    /// The units of some bins. Checks that each unit keeps the promises of the layout.
     fn units(sizes: &[u32]) -> Vec<Range<usize>> {
         let all: usize = sizes.iter().map(|&size| size as usize).sum();
         let units: Vec<_> = Units::new(sizes).collect();

@@ -255,7 +255,7 @@ impl<'a> LastPart<'a> {
     }
 }
 
-/// Reads triangles of which many lie in the same part as the one before.
+/// Reads triangles. Many lie in the same part as the triangle before.
 #[derive(Debug)]
 pub(crate) struct Reader<'m> {
     whole: &'m TriangleMesh<'m>,

@@ -71,7 +71,7 @@ pub(crate) struct PlacedBatch {
     pub(super) rows: [[u32; LANES]; Self::EIGHTS],
     pub(super) xs: [[u32; LANES]; Self::EIGHTS],
     pub(super) more: [[u32; LANES]; Self::EIGHTS],
-    /// Bits of those that are placed; of the others the cells are not known here.
+    /// A bit for each primitive that is placed. The cells of other primitives are not known here.
     pub(super) is_placed: u64,
 }
 

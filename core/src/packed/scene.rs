@@ -339,7 +339,7 @@ impl<'a> Scene<'a> {
         }
         let references = object_count.checked_sub(count.into()).ok_or(damaged)?;
 
-        // The first objects are the members by their numbers; the others are the arrays of the scenes.
+        // First come the members, in the order of their numbers, then the arrays of the scenes.
         let split_objects = objects.split_at_mut_checked(count as usize);
         let (table, mut free) = split_objects.ok_or(damaged)?;
         let behind = blob.get(HEADER_BYTES..).unwrap_or_default();

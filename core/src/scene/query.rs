@@ -372,8 +372,8 @@ impl InstanceSearch<'_, '_> {
     }
 }
 
-/// Returns the closest hit of a ray in a grid or in shapes, if its `t` is no more than `until`; with `is_any`, a hit
-/// of which only the existence counts.
+/// Returns the closest hit of a ray in a grid or in shapes, if its `t` is no more than `until`. With `is_any`, any hit
+/// will do.
 pub(super) fn ask_object(
     object: &Object<'_>,
     ray: &Ray,

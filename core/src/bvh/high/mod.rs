@@ -423,7 +423,7 @@ fn gather(
     (count, levels)
 }
 
-/// Parts of the work of a single task, after each of which progress is reported.
+/// The steps of the work of a single task. It reports progress after each.
 const STEPS: usize = 64;
 
 /// The ranges of a task, and where their nodes lie.
