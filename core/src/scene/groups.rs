@@ -142,7 +142,7 @@ impl<'r> SceneRays<'r> {
 
     /// Asks an instance for some rays.
     fn offer(&mut self, number: u32, mask: u64, outer: &mut Rays) {
-        let Some((placed, object)) = self.scene.shown(number, &self.parameters) else { return };
+        let Some((stored, object)) = self.scene.shown(number, &self.parameters) else { return };
         let grid = match object {
             Object::Grid(grid) => Some(*grid),
             Object::Shapes(shapes, _) => Some(shapes.grid()),
@@ -152,7 +152,7 @@ impl<'r> SceneRays<'r> {
             && let Some(tree) = grid.tree()
             && mask.count_ones() > FEW
         {
-            self.together(number, placed, object, (grid, tree), mask, outer);
+            self.together(number, stored, object, (grid, tree), mask, outer);
             return;
         }
         for lane in lanes(mask) {
@@ -185,7 +185,7 @@ impl<'r> SceneRays<'r> {
     fn together(
         &mut self,
         number: u32,
-        placed: &StoredInstance,
+        stored: &StoredInstance,
         object: &Object<'_>,
         (grid, bvh): (&Grid<'_>, &Bvh<'_>),
         mask: u64,
@@ -196,7 +196,7 @@ impl<'r> SceneRays<'r> {
         let mut count = 0;
         for lane in lanes(mask) {
             let ray = &self.given[lane as usize % GROUP];
-            let Some(mut object_ray) = ObjectRay::new(&placed.line(&LineF64::from(ray))) else {
+            let Some(mut object_ray) = ObjectRay::new(&stored.line(&LineF64::from(ray))) else {
                 continue;
             };
             let limit = self.best[lane as usize % GROUP].t;

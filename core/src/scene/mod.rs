@@ -206,9 +206,9 @@ impl<'a> Scene<'a> {
         let mut instances = [None; MAX_NESTING];
         let mut scene = *self;
         for (level, &number) in hit.path.iter().enumerate() {
-            let placed = scene.instances.get(number as usize)?;
-            *instances.get_mut(level)? = Some(placed);
-            let object = scene.objects.get(placed.object() as usize)?;
+            let stored = scene.instances.get(number as usize)?;
+            *instances.get_mut(level)? = Some(stored);
+            let object = scene.objects.get(stored.object() as usize)?;
             let count = match object {
                 Object::Scene(inner) => {
                     scene = **inner;

@@ -221,8 +221,8 @@ impl Scene<'_> {
         if mask != u32::MAX && self.tree.mesh().mask(number) & mask == 0 {
             return None;
         }
-        let placed = self.instances.get(number as usize)?;
-        Some((placed, self.objects.get(placed.object() as usize)?))
+        let stored = self.instances.get(number as usize)?;
+        Some((stored, self.objects.get(stored.object() as usize)?))
     }
 
     /// The closest hit of a ray no farther than a limit, or any; at a level of nesting. `line` is the ray as this
@@ -326,8 +326,8 @@ impl InstanceSearch<'_, '_> {
     pub(super) fn ask(&mut self, number: u32) -> Option<SceneHit> {
         let Self { scene, line, ray, level, parameters, .. } = *self;
         let is_any = parameters.is_any;
-        let (placed, object) = scene.shown(number, parameters)?;
-        let line = placed.line(line);
+        let (stored, object) = scene.shown(number, parameters)?;
+        let line = stored.line(line);
 
         // Inside a scene the ray keeps its f64 and its `t`.
         if let Object::Scene(inner) = object {

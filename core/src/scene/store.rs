@@ -45,13 +45,13 @@ pub(crate) fn ends_of(header: &Header) -> (u64, u64) {
 /// The boxes of instances as the tree sees them.
 fn boxes_of<'a>(
     sides: &'a [BoxSides],
-    placed: &'a [StoredInstance],
+    stored: &'a [StoredInstance],
 ) -> Result<TriangleMesh<'a>, Error> {
     let bytes = sides.as_bytes();
     let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
     // Without instances there are no masks.
-    let bytes = placed.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
-    let masks = Strided { bytes, stride: size_of::<StoredInstance>(), count: placed.len() };
+    let bytes = stored.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
+    let masks = Strided { bytes, stride: size_of::<StoredInstance>(), count: stored.len() };
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
 }
 
@@ -68,24 +68,24 @@ fn fill<'t>(
         let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
         Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
     });
-    let (table, sides, places) = sections.ok_or(short)?;
-    let to = sides.iter_mut().zip(&mut *places);
+    let (table, sides, slots) = sections.ok_or(short)?;
+    let to = sides.iter_mut().zip(&mut *slots);
     for (number, (instance, to)) in (0_u32..).zip(instances.iter().zip(to)) {
         let Some(object) = objects.get(instance.object as usize) else {
             return Err(Error::InstanceWithoutObject { instance: number });
         };
-        let placed = StoredInstance::new(instance);
-        let bounds = placed.and_then(|placed| placed.bounds(&object.bounds()));
-        let (Some(placed), Some(bounds)) = (placed, bounds) else {
+        let stored = StoredInstance::new(instance);
+        let bounds = stored.and_then(|stored| stored.bounds(&object.bounds()));
+        let (Some(stored), Some(bounds)) = (stored, bounds) else {
             return Err(Error::InstanceWithoutInverse { instance: number });
         };
-        (*to.0, *to.1) = (bounds, placed);
+        (*to.0, *to.1) = (bounds, stored);
     }
     let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
     if let Some(table) = table.first_mut().or_bug("a scene without a table") {
         *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
     }
-    boxes_of(sides, places)
+    boxes_of(sides, slots)
 }
 
 /// The levels of a scene over these objects.
@@ -261,12 +261,12 @@ impl<'a> Scene<'a> {
         let instances_at =
             start + table_bytes + section_bytes::<BoxSides>(header.triangle_count.into());
         let mut object_count = 0;
-        for (number, placed) in (0_u32..).zip(self.instances) {
+        for (number, stored) in (0_u32..).zip(self.instances) {
             let offset = instances_at + u64::from(number) * size_of::<StoredInstance>() as u64;
-            let object = self.objects.get(placed.object() as usize);
-            let bounds = object.and_then(|object| placed.bounds(&object.bounds()));
+            let object = self.objects.get(stored.object() as usize);
+            let bounds = object.and_then(|object| stored.bounds(&object.bounds()));
             let bounds = bounds.ok_or(Error::Corrupt { offset })?;
-            object_count = object_count.max(placed.object().saturating_add(1));
+            object_count = object_count.max(stored.object().saturating_add(1));
             let stored = self.tree.mesh().box_bytes(number);
             if stored.is_none_or(|stored| stored != bounds.as_bytes()) {
                 let offset = start + table_bytes + u64::from(number) * BOX_BYTES as u64;
