@@ -31,7 +31,7 @@ impl Rays {
         self.may_block && self.choice.has(mesh, id) && !self.choice.asks(mesh, id)
     }
 
-    /// Ends the rays, given as bits, that a triangle blocks. The place of the hit is not known.
+    /// Ends the rays, given as bits, that a triangle blocks. The `t` of the hit is not known.
     #[inline(always)]
     pub(crate) fn block(&mut self, rays: u64, id: u32) {
         self.alive &= !rays;
@@ -53,7 +53,7 @@ impl Rays {
         if !self.choice.has(mesh, id) {
             return;
         }
-        self.pair_places[self.pair_count % PAIRS] = ray;
+        self.pair_lanes[self.pair_count % PAIRS] = ray;
         self.pair_ids[self.pair_count % PAIRS] = id;
         self.pair_count += 1;
         if self.pair_count == PAIRS {
@@ -69,7 +69,7 @@ impl Rays {
             for at in 0..count {
                 self.decide_one::<ANY>(
                     mesh,
-                    self.pair_places[at % PAIRS],
+                    self.pair_lanes[at % PAIRS],
                     self.pair_ids[at % PAIRS],
                 );
             }
@@ -88,10 +88,10 @@ impl Rays {
     ) {
         // Repeat the first pair where there are fewer: it is read already.
         for at in count..PAIRS {
-            self.pair_places[at] = self.pair_places[0];
+            self.pair_lanes[at] = self.pair_lanes[0];
             self.pair_ids[at] = self.pair_ids[0];
         }
-        let (of, ids) = (self.pair_places, self.pair_ids);
+        let (of, ids) = (self.pair_lanes, self.pair_ids);
         let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
         let decided = pairs::decide(simd, mesh, rays, Triangles::Each { ids, count });
@@ -202,7 +202,7 @@ impl Rays {
     }
 
     /// Ends each ray behind its `t` in `until`: farther hits do not matter. Call it before any hit is found. The range
-    /// of a ray stays as it is and decides what is a hit. Places without a ray may hold anything.
+    /// of a ray stays as it is and decides what is a hit. Lanes without a ray may hold anything.
     #[inline(always)]
     pub(crate) fn take_until<S: Simd>(&mut self, simd: S, until: &[f32; GROUP]) {
         let octets: &PerRay = transmute_ref!(until);

@@ -74,7 +74,7 @@ pub(crate) struct Rays {
     /// [`take_until`](Self::take_until) may have set the `t`.
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
-    pair_places: [u32; PAIRS],
+    pair_lanes: [u32; PAIRS],
     pair_ids: [u32; PAIRS],
     pair_count: usize,
 }
