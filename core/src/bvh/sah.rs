@@ -136,7 +136,7 @@ struct BinScale {
 impl BinScale {
     #[inline(always)]
     fn new<S: Simd>(simd: S, count: usize, centers: f32x8<S>) -> Self {
-        // Keep every place below the number of bins, in spite of rounding.
+        // Keep every position below the number of bins, in spite of rounding.
         #[expect(clippy::cast_precision_loss, reason = "a few")]
         let bins = f32x4::splat(simd, count as f32 * 0.999);
         let (low, high) = centers.split();
@@ -150,8 +150,8 @@ impl BinScale {
     fn bins_of<S: Simd>(&self, simd: S, sides: f32x8<S>) -> [usize; 3] {
         let (min, max) = sides.split();
         let (low, scale) = (f32x4::simd_from(simd, self.low), f32x4::simd_from(simd, self.scale));
-        let places = ((min - max) - low) * scale - f32x4::splat(simd, 0.5);
-        let [x, y, z, _]: [f32; 4] = (places + f32x4::splat(simd, WHOLE_SHIFT)).into();
+        let positions = ((min - max) - low) * scale - f32x4::splat(simd, 0.5);
+        let [x, y, z, _]: [f32; 4] = (positions + f32x4::splat(simd, WHOLE_SHIFT)).into();
         [bin(x), bin(y), bin(z)]
     }
 
@@ -159,15 +159,15 @@ impl BinScale {
     #[inline(always)]
     fn bin_of(&self, item: &Item, axis: usize) -> usize {
         let twice = f32::from_bits(item[axis % 3]) - f32::from_bits(item[4 + axis % 3]);
-        let place = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
-        bin(place + WHOLE_SHIFT)
+        let position = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
+        bin(position + WHOLE_SHIFT)
     }
 }
 
-/// The bin of a place to which [`WHOLE_SHIFT`] was added.
+/// The bin of a position to which [`WHOLE_SHIFT`] was added.
 #[inline(always)]
-const fn bin(place: f32) -> usize {
-    place.to_bits() as usize % MOST_BINS
+const fn bin(position: f32) -> usize {
+    position.to_bits() as usize % MOST_BINS
 }
 
 /// A split of a range: an axis, and the bin on it at which the second part begins.
@@ -296,7 +296,7 @@ impl Kernel for SplitInTwo<'_> {
 ///
 /// This is Lomuto's partition as one cycle of moves. The first item is set aside and leaves a gap. Each step moves the
 /// item behind the first part into the gap, and puts the item behind the gap in its place, which leaves the next gap.
-/// The first part grows if that item belongs to it. No branch depends on the part of an item, as that is unpredictable.
+/// The first part grows if that item belongs to it. No branch depends on the part of an item, as it is unpredictable.
 /// A choice between two items would become a masked store where the compiler may use AVX-512, and the next loads would
 /// wait for it.
 #[inline(always)]
@@ -309,7 +309,7 @@ fn partition<S: Simd>(simd: S, items: &mut [Item], rule: &BinScale, split: &Spli
         let item = items.get(gap + 1).unwrap_or(&start);
         let is_first = rule.bin_of(item, split.axis()) < split.bin();
         let item = u32x8::simd_from(simd, *item);
-        let Some(other) = items.get(middle).or_bug("a place behind the items") else { break };
+        let Some(other) = items.get(middle).or_bug("an index behind the items") else { break };
         put(items, gap, u32x8::simd_from(simd, *other));
         put(items, middle, item);
         middle += usize::from(is_first);
@@ -320,7 +320,7 @@ fn partition<S: Simd>(simd: S, items: &mut [Item], rule: &BinScale, split: &Spli
 /// Stores an item.
 #[inline(always)]
 fn put<S: Simd>(items: &mut [Item], at: usize, item: u32x8<S>) {
-    if let Some(slot) = items.get_mut(at).or_bug("a place behind the items") {
+    if let Some(slot) = items.get_mut(at).or_bug("an index behind the items") {
         *slot = item.into();
     }
 }
