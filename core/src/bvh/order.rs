@@ -62,7 +62,7 @@ impl Sorted<'_> {
         waiting.map(|(place, slot)| (place, *slot as u32))
     }
 
-    /// The place in the window of the ray at a place of the order.
+    /// Returns the place in the window of ray `at` of the order.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
     pub(crate) fn place(&self, at: usize) -> usize {

@@ -233,15 +233,15 @@ impl Fineness {
         depth: u32,
     ) -> Option<[u32; 3]> {
         let cells = (self.density * f64::from(primitives)).max(1.0);
-        let m = root(cells, 2 * (self.depth - depth) + 1);
+        let m = nth_root(cells, 2 * (self.depth - depth) + 1);
         let volume = size.iter().product::<f64>();
-        let mut parts = size.map(|s| s * m / root(volume, 3));
+        let mut parts = size.map(|s| s * m / nth_root(volume, 3));
 
         // An axis with less than one cell gets one, and the others share the loss; if one of them then has less
         // than one, too, it gets one, and the third takes the loss alone.
         for axis in 0..3 {
             if parts[axis] < 1.0 {
-                let share = root(parts[axis], 2);
+                let share = nth_root(parts[axis], 2);
                 let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
                 parts[axis] = 1.0;
                 parts[next] *= share;
@@ -294,7 +294,7 @@ pub(super) fn inside(lattice: &Lattice, node: &GridNode, cell: [u32; 3], reach: 
 }
 
 /// A root of a positive number by Newton's method, from above: the same bits everywhere.
-fn root(x: f64, degree: u32) -> f64 {
+fn nth_root(x: f64, degree: u32) -> f64 {
     const BIAS: i64 = 1023;
     let exponent = (x.to_bits() >> 52 & 0x7ff).cast_signed() - BIAS;
     let above = exponent.div_euclid(i64::from(degree)) + 1 + BIAS;
