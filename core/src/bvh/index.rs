@@ -35,8 +35,8 @@ pub(super) fn clear_header(index: &mut Option<&mut [u8]>) {
     }
 }
 
-/// Returns the places of so many ids and of nodes in an index. No index, or one that is too small, is legal: ids and
-/// nodes for which there is no room are only counted.
+/// Returns the sections of an index for so many ids and for nodes. No index, or one that is too small, is legal: ids
+/// and nodes for which there is no room are only counted.
 pub(super) fn cut_index<'i>(
     index: &'i mut Option<&mut [u8]>,
     ids: u32,

@@ -9,7 +9,7 @@
 //! cell becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on
 //! and counts: at the end it knows, exactly, what index it would have needed.
 //!
-//! Nested detail, fans and slabs would take a build without end: each triangle lies in many cells of each grid. So a
+//! Nested detail, fans and plates would take a build without end: each triangle lies in many cells of each grid. So a
 //! build has a budget of *looks*, [`LOOKS`] for each triangle. A grid below the root takes one for each of its cells,
 //! and two for each cell in the box of each of its triangles, to count and to fill. It gets a share of the looks that
 //! are left, as large as its share of the references. A cell whose grid would take more stays a list.
