@@ -127,12 +127,13 @@ pub struct hgrid_scene_options {
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
     /// Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in its batch, 0
-    /// for a single ray. Within an instance it is asked from near to far and about each triangle at most once;
-    /// instances come roughly front to back, so a hit that it accepts may be replaced by a closer one of another
-    /// instance. What lies behind a hit that it accepted is not shown to it. In a batch it is asked about all hits of
-    /// one ray before those of the next. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to
-    /// it. It runs on the calling thread, may query the same scene, and must not be left by `longjmp` or by a C++
-    /// exception.
+    /// for a single ray.
+    ///
+    /// Within an instance the filter is asked from near to far, and about each triangle at most once. Instances come
+    /// roughly front to back, so a hit that it accepts may be replaced by a closer one of another instance. Hits behind
+    /// one that it accepted are not shown to it, and shapes never are. In a batch it gets all hits of one ray before
+    /// those of the next. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. The filter runs on the calling thread,
+    /// may query the same scene, and must not be left by `longjmp` or by a C++ exception.
     pub filter: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
