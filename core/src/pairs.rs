@@ -351,15 +351,15 @@ mod tests {
             // Near the origin or far from it, tiny or huge.
             let shift = [0.0, 0.0, 100.0, 1e5][random.below(4)];
             let scale = [1.0, 1.0, 1e-20, 1e15][random.below(4)];
-            let place = |point: [f32; 3]| point.map(|x| (x + shift) * scale);
+            let moved = |point: [f32; 3]| point.map(|x| (x + shift) * scale);
             let near: [Triangle; LANES] = core::array::from_fn(|_| triangle(&mut random));
-            let triangles = near.map(|triangle| triangle.map(place));
+            let triangles = near.map(|triangle| triangle.map(moved));
             let rays = near.map(|near| {
                 let (origin, direction) = line(&mut random, &near);
                 let length = [1.0, 1.0, 1e-36, 1e20][random.below(4)];
-                let ray = Ray::new(place(origin), direction.map(|d| d * length));
+                let ray = Ray::new(moved(origin), direction.map(|d| d * length));
                 let whole = Ray { t_min: f32::NEG_INFINITY, ..ray };
-                let triangle = near.map(place);
+                let triangle = near.map(moved);
                 let met = TriangleTest::new(&whole).and_then(|test| test.test(&triangle));
                 let [t_min, t_max] = range(&mut random, met.map_or(1.0, |met| met.t));
                 Ray { t_min, t_max, ..whole }

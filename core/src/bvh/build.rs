@@ -314,13 +314,13 @@ struct UnitsTask<'w, F> {
     goes_on: F,
 }
 
-/// The numbers of nodes and roots that a task made, and where its entries and nodes start.
+/// The numbers of nodes and subtrees that a task made, and where its entries and nodes start.
 #[derive(Clone, Copy, Default)]
 struct Made {
     first: u32,
     child: u32,
     nodes: u32,
-    roots: u32,
+    subtrees: u32,
 }
 
 impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
@@ -360,7 +360,8 @@ impl<F: FnMut(usize) -> bool> Kernel for UnitsTask<'_, F> {
             }
         }
         debug_assert!(end == range.end, "the units of a task end elsewhere than its entries");
-        let made = Made { first, child, nodes: subtrees.node_count, roots: subtrees.subtree_count };
+        let made =
+            Made { first, child, nodes: subtrees.node_count, subtrees: subtrees.subtree_count };
         (made, subtrees.last)
     }
 }
@@ -389,7 +390,7 @@ impl BuildInputs<'_> {
             UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts, goes_on };
         let (made, last) = dispatch(SimdLevel::detect(), task);
         result?;
-        Ok(TaskTotals { nodes: 1 + made.nodes, roots: made.roots, last })
+        Ok(TaskTotals { nodes: 1 + made.nodes, subtrees: made.subtrees, last })
     }
 
     /// [`subtrees`](Self::subtrees) with several tasks. Out of line: their results take stack.
@@ -433,13 +434,13 @@ impl BuildInputs<'_> {
             child += room as u32;
             part
         });
-        let level = SimdLevel::detect();
+        let simd_level = SimdLevel::detect();
         let mut results = [const { None }; tasks::MOST];
         let mut slots = results.iter_mut();
         run_several(
             control,
             parts,
-            |part| dispatch(level, part),
+            |part| dispatch(simd_level, part),
             |result| {
                 if let Some(slot) = slots.next().or_bug("more results than tasks") {
                     *slot = Some(result);
@@ -449,16 +450,16 @@ impl BuildInputs<'_> {
         )?;
 
         // Move nodes and records together.
-        let mut all = TaskTotals { nodes: 1, roots: 0, last: RootRecord::new_zeroed() };
+        let mut all = TaskTotals { nodes: 1, subtrees: 0, last: RootRecord::new_zeroed() };
         for (made, last) in results.into_iter().flatten() {
             let moved = made.child - all.nodes;
             move_nodes(nodes, made.child..made.child + made.nodes, all.nodes);
-            let to = all.roots as usize * RECORD;
+            let to = all.subtrees as usize * RECORD;
             let from = made.first as usize;
-            let records = from..from + made.roots as usize * RECORD;
+            let records = from..from + made.subtrees as usize * RECORD;
             all.nodes += made.nodes;
-            all.roots += made.roots;
-            if made.roots == 1 {
+            all.subtrees += made.subtrees;
+            if made.subtrees == 1 {
                 // Write the record again: a task with fewer entries than a record takes had no room for it.
                 all.last = last;
                 all.last.node.child -= moved;
@@ -500,14 +501,14 @@ impl BuildInputs<'_> {
         all: &TaskTotals,
     ) -> Option<Contents<'e>> {
         // A single root is the whole tree.
-        if all.roots < 2 {
+        if all.subtrees < 2 {
             // Empty `nodes` are legal: nodes are only counted then.
             if let Some(root) = nodes.first_mut() {
-                *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
+                *root = if all.subtrees == 1 { all.last.node } else { Node::EMPTY };
             }
             return Some(Contents { nodes: all.nodes, levels: all.last.levels.max(1), fine: &[] });
         }
-        let roots = all.roots as usize;
+        let roots = all.subtrees as usize;
         debug_assert!(
             roots * (RECORD + ITEM) <= entries.len(),
             "too few entries for the records of the roots"
@@ -544,7 +545,7 @@ impl BuildInputs<'_> {
 struct TaskTotals {
     /// Nodes, with one for the root of all.
     nodes: u32,
-    roots: u32,
+    subtrees: u32,
     /// The record of the last root.
     last: RootRecord,
 }

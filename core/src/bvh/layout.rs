@@ -32,7 +32,7 @@
 //! nodes      <= 0.14625 n + 1 + 11 late / 7 + 3     1 as the first term is rounded up; 3 are to spare
 //! fine       <= n / 2048                             none below 2048 triangles
 //! index       = 128 + 4 n + 80 nodes + 196 fine, and paddings of at most 60, 48 and 60
-//!            <= 15.7 n + 636                        n < 2048: one is late, and 11 / 7 is rounded down to 1
+//!            <= 15.7 n + 636                        n < 2048: one late subtree has one node; 11 / 7 is rounded down
 //!            <= 15.8 n + 696 <= 16 n + 640          n < 4097: the same
 //!            <= 15.96 n + 742 <= 16 n + 640         otherwise
 //! scratch     = 2 x 4 bins + 8 n + 8 n, and 4 paddings of at most 60; one bin, or 16 triangles or more a bin

@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_are_cut_before_leaves_and_wide_parts_before_others() {
+    fn nodes_are_split_before_leaves_and_wide_parts_before_others() {
         let limits = Limits { leaf: 8, small: 4, bins: 16, halved_from: 1 };
         let splitter = Splitter::new(&Aabb { min: Vec3A::ZERO, max: Vec3A::ONE }, limits);
         // Parts of so many items with such surfaces; the part that is split next, and the one if parts are halved.

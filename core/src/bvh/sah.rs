@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cheapest_cut_is_found_alike_with_all_vectors() {
+    fn the_cheapest_split_is_found_alike_with_all_vectors() {
         let mut state = 1;
         let mut bins = Bins::new();
         // The first count uses all bins. Later splits must not read what it left there.

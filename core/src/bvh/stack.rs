@@ -9,16 +9,16 @@ use super::Bvh;
 use super::layout::LEVELS;
 use super::node::Child;
 
-/// Places on the first stack of a ray. It is short, because every query zeroes it; the few rays that need more places
+/// Entries of the first stack of a ray. It is short, because every query zeroes it; the few rays that need more entries
 /// go on with a larger stack.
 pub(crate) const FIRST_STACK: usize = 32;
 
-/// Places on the largest stack: seven a level, and one.
+/// Entries of the largest stack: seven a level, and one.
 pub(crate) const STACK: usize = 7 * LEVELS as usize + 1;
 
 /// The most levels of a tree for which the small stack is large enough, as it is for nearly all.
 pub(crate) const FEW_LEVELS: u32 = 14;
-/// Places on a small stack.
+/// Entries of a small stack.
 const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
 /// A child on the stack: in the high half the bits of the distance at which the ray enters it, in the low
