@@ -89,7 +89,7 @@ fn instances_are_for_trees_and_embree() {
     let others = if cfg!(feature = "peers") { "parry-ploc," } else { "" };
     let words = format!(
         "compare procedural:knot:500 --instances 30 --size 32 --repeat 1 --methods one-level,bvh \
-         --peers {others}embree-low,embree-dynamic,embree-medium --workloads primary,ao,near --json {}",
+         --peers {others}embree-low,embree-dynamic,embree-medium,embree-compact --workloads primary,ao,near --json {}",
         file.display()
     );
     let output = hgrid(&words).unwrap();
@@ -111,7 +111,7 @@ fn instances_are_for_trees_and_embree() {
     let systems = scene["systems"].as_array().unwrap();
     let names: Vec<_> = systems.iter().filter_map(|system| system["system"].as_str()).collect();
     assert_eq!(scene["instances"], 30);
-    assert_eq!(names, ["bvh", "embree-low", "embree-dynamic", "embree-medium"]);
+    assert_eq!(names, ["bvh", "embree-low", "embree-dynamic", "embree-medium", "embree-compact"]);
     for system in systems {
         // The matrix, the place and the box of an instance take less than the structure of the mesh.
         let each = system["index_bytes"].as_u64().unwrap() / 30;
@@ -126,7 +126,7 @@ fn spheres_are_for_trees_and_embree() {
     let file = std::env::temp_dir().join(format!("hgrid-spheres-{}.json", std::process::id()));
     let words = format!(
         "compare procedural:knot:500 --spheres --size 32 --repeat 1 --methods one-level,bvh \
-         --peers embree-low,embree-medium --workloads primary,ao,far --json {}",
+         --peers embree-low,embree-compact --workloads primary,ao,far --json {}",
         file.display()
     );
     let output = hgrid(&words).unwrap();

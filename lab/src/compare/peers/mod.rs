@@ -136,8 +136,8 @@ impl Peer {
     }
 }
 
-/// Starts a system for each peer. If none is named, starts all that this program has, except for two ways to build with
-/// Embree that no row of ratios names.
+/// Starts a system for each peer. If none is named, starts all that this program has, except for `embree-high` and
+/// `embree-robust`, which no row of ratios needs.
 ///
 /// # Errors
 /// If this program lacks one of the peers, or a library does not start.

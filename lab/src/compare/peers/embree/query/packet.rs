@@ -52,7 +52,7 @@ impl Scene<'_> {
         let mut context = context(hint);
         let mut both = RayHits { rays: no_rays(), hits: no_hits() };
         for (rays, answers) in rays.chunks(LANES).zip(hits.chunks_mut(LANES)) {
-            let valid = both.rays.ask(rays);
+            let valid = both.rays.set(rays);
             // Of a hit, Embree only needs the geometry to be invalid.
             both.hits.geometry = [ffi::INVALID_ID; LANES];
             // SAFETY: the scene is committed; the structs are those of the header, aligned; every lane has a mark.
@@ -86,7 +86,7 @@ impl Scene<'_> {
         let mut context = context(hint);
         let mut packet = no_rays();
         for (rays, answers) in rays.chunks(LANES).zip(occluded.chunks_mut(LANES)) {
-            let valid = packet.ask(rays);
+            let valid = packet.set(rays);
             // SAFETY: as in `intersect_packets_by`.
             unsafe {
                 occlude(
@@ -119,7 +119,7 @@ const fn no_rays<const LANES: usize>() -> Rays<LANES> {
 
 impl<const LANES: usize> Rays<LANES> {
     /// Sets the next rays, up to `LANES`, axis by axis, and marks their lanes. Embree changes nothing but the far ends.
-    fn ask(&mut self, rays: &[Ray]) -> Valid<LANES> {
+    fn set(&mut self, rays: &[Ray]) -> Valid<LANES> {
         let mut valid = Valid([0; LANES]);
         for (lane, ray) in rays.iter().enumerate().take(LANES) {
             valid.0[lane] = -1;
