@@ -119,7 +119,7 @@ fn of_distances_that_round_to_the_same_the_lowest_id_wins() {
     }
 }
 
-/// The loops of the other tests ask about each triangle by this function, so they would repeat its mistake.
+/// The loops of the other tests ask by `ClosestPoint::on_triangle`, so they would repeat its mistake.
 #[test]
 fn a_triangle_beyond_the_range_is_not_found() {
     let mesh = one_triangle();

@@ -1,7 +1,7 @@
 /* Prints the stack use of queries and builds in bytes, one "name most" a line: the most over all methods and meshes
- * (stack.h), on a stack that was filled before. A line "name_few most" tells the same of trees of few levels only, and
- * "levels most" the levels of the deepest tree.
- * Grids also stand in scenes, and their triangles serve as shapes.
+ * (stack.h), on a stack that was filled before. A line "name_few most" tells the same of trees of few levels, for
+ * calls that walk one tree, and "levels most" the levels of the deepest tree. Grids also stand in scenes, and their
+ * triangles serve as shapes.
  *
  * A ray that meets many boxes at once takes more stack than others. In a tangle it does: long triangles overlap, and
  * a chain of ever smaller ones makes a deep tree. The instances of a scene have such a chain, too. */
@@ -17,8 +17,8 @@ enum { TILED = 768, RAYS = TILED + 256, STACK = 256 * 1024 };
 enum { FEW_LEVELS = 14, LEVELS_AT = 116 };
 
 static hgrid_mesh mesh;
-/* The mesh is a tangle, which takes rays long. */
-static bool is_tangled;
+/* The mesh is a tangle, a chain or nested: some of them take rays long. */
+static bool is_slow;
 
 /* A build with memory for it. */
 typedef struct {
@@ -85,7 +85,7 @@ static void many(void)
     const hgrid_query_options all = options();
     hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
     masked.mask = 1;
-    const int first = is_tangled ? RAYS - 64 : 0;
+    const int first = is_slow ? RAYS - 64 : 0;
     const size_t count = (size_t)(RAYS - first);
     const hgrid_ray *const far = mixed + first, *const near = rays + first;
     for (hgrid_coherence c = 0; c < 2; c++) {
@@ -124,6 +124,7 @@ HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BO
 HGRID_ALIGNED static unsigned char all_kinds_blob[HGRID_SCENE_BOUND(SHOWN)];
 HGRID_ALIGNED static unsigned char small_scratch[HGRID_BVH_HIGH_SCRATCH_BOUND(SHAPES)];
 HGRID_ALIGNED static unsigned char shape_blob[HGRID_INDEX_BOUND(SHAPES)];
+static void *const shapes_index = shape_blob;
 HGRID_ALIGNED static unsigned char link_blob[HGRID_INDEX_BOUND(TRIANGLES)];
 static float corner_boxes[SHAPES][6];
 /* The mesh of the instances in chains, and its tree. */
@@ -159,7 +160,7 @@ static void ask_scene_together(const hgrid_scene *scene)
     static hgrid_scene_hit found[RAYS];
     static unsigned char sorted[16 * RAYS];
     const hgrid_ray *each[] = {mixed, rays};
-    const int first = is_tangled ? RAYS - 64 : 0;
+    const int first = is_slow ? RAYS - 64 : 0;
     const size_t count = (size_t)(RAYS - first);
     for (int order = 0; order < 2; order++) {
         for (int i = 0; i < RAYS - first; i++) {
@@ -228,7 +229,7 @@ static void boxes_of_triangles_together(void)
     hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_query_options all = options();
     const hgrid_ray *each[] = {mixed, rays};
-    const int first = is_tangled ? RAYS - 64 : 0;
+    const int first = is_slow ? RAYS - 64 : 0;
     const size_t count = (size_t)(RAYS - first);
     masked.mask = 1, masked.scratch = sorted, masked.scratch_bytes = sizeof sorted;
     for (int order = 0; order < 2; order++)
@@ -305,7 +306,7 @@ static void build_scenes(void)
                                                : hgrid_object_scene(&around[level - 1], inner);
         CHECK(status == HGRID_OK);
         CHECK(hgrid_object_grid(&link_tree, &shown[level][1]) == HGRID_OK);
-        build_level(level, level == 0 && !is_tangled ? SHOWN : SHOWN_FEW);
+        build_level(level, level == 0 && !is_slow ? SHOWN : SHOWN_FEW);
     }
     build_shapes();
     static hgrid_object kinds[3];
@@ -472,12 +473,16 @@ int main(int argc, char **argv)
     struct {
         const char *name;
         void (*call)(void);
+        /* The blob of the one tree that the call walks; NULL if there are more. */
+        void *const *blob;
         size_t most, most_few;
-    } calls[] = {{"build", build, 0, 0}, {"tasks", tasks, 0, 0}, {"one", one, 0, 0},
-                 {"options", with_options, 0, 0}, {"closest", closest, 0, 0}, {"many", many, 0, 0},
-                 {"scenes", build_scenes, 0, 0}, {"scene", flat_scene, 0, 0}, {"nested", nested_scenes, 0, 0},
-                 {"scene_many", flat_scene_together, 0, 0}, {"nested_many", nested_scenes_together, 0, 0},
-                 {"shapes", boxes_of_triangles, 0, 0}, {"shapes_many", boxes_of_triangles_together, 0, 0}};
+    } calls[] = {{"build", build, NULL, 0, 0}, {"tasks", tasks, NULL, 0, 0}, {"one", one, &by_one_task.index, 0, 0},
+                 {"options", with_options, &by_one_task.index, 0, 0}, {"closest", closest, &by_one_task.index, 0, 0},
+                 {"many", many, &by_one_task.index, 0, 0}, {"scenes", build_scenes, NULL, 0, 0},
+                 {"scene", flat_scene, NULL, 0, 0}, {"nested", nested_scenes, NULL, 0, 0},
+                 {"scene_many", flat_scene_together, NULL, 0, 0}, {"nested_many", nested_scenes_together, NULL, 0, 0},
+                 {"shapes", boxes_of_triangles, &shapes_index, 0, 0},
+                 {"shapes_many", boxes_of_triangles_together, &shapes_index, 0, 0}};
     uint32_t most_levels = 0;
     enum { CALLS = sizeof calls / sizeof *calls };
     for (uint32_t number = 0; number < MESHES; number++)
@@ -487,7 +492,7 @@ int main(int argc, char **argv)
             /* Grids over crowds need no more stack and take half a minute. */
             if (is_part && !is_of_part(number, method))
                 continue;
-            is_tangled = number >= TANGLED;
+            is_slow = number >= TANGLED;
             mesh = mesh_number(number);
             by_one_task = job_of(method, 1), by_many_tasks = job_of(method, HGRID_MAX_TASKS);
             for (int i = 0; i < CALLS; i++) {
@@ -496,15 +501,17 @@ int main(int argc, char **argv)
                     continue;
                 const size_t bytes = stack_of(calls[i].call);
                 calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
-                const bool is_of_shapes = i >= CALLS - 2;
-                const uint32_t levels = levels_of(is_of_shapes ? shape_blob : by_one_task.index);
+                const uint32_t levels = calls[i].blob ? levels_of(*calls[i].blob) : 0;
                 most_levels = levels > most_levels ? levels : most_levels;
                 if (levels > 0 && levels <= FEW_LEVELS)
                     calls[i].most_few = bytes > calls[i].most_few ? bytes : calls[i].most_few;
             }
         }
-    for (int i = 0; i < CALLS; i++)
-        printf("%s %zu\n%s_few %zu\n", calls[i].name, calls[i].most, calls[i].name, calls[i].most_few);
+    for (int i = 0; i < CALLS; i++) {
+        printf("%s %zu\n", calls[i].name, calls[i].most);
+        if (calls[i].blob)
+            printf("%s_few %zu\n", calls[i].name, calls[i].most_few);
+    }
     printf("levels %u\n", (unsigned)most_levels);
     printf("task %zu\n", most_of_a_task);
     return 0;

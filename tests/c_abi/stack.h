@@ -3,8 +3,9 @@
 enum { CROWDS = 2, CROWD = 17000 };
 /* The triangles of a tangle, and those of them in the chain; those of a chain alone. */
 enum { TANGLE = 1480, CHAIN = 480, LINKED_CHAIN = 400 };
-/* The outer triangles of a nested mesh, and those of its crowd: a build divides it as often as it divides any. */
-enum { DIVISIONS = 6, CORE = 4500 };
+/* The outer triangles of a nested mesh, and those of its crowd. The bins of the mesh tell one outer triangle from the
+ * crowd, and so does each division of the crowd's bin. There are five divisions, as many as a build makes at most. */
+enum { OUTER = 6, CORE = 4500 };
 /* Meshes have the number of their crowds; behind them come a tangle, a chain that makes a tree of few levels, and a
  * nested mesh. */
 enum { TANGLED = CROWDS + 1, LINKED, NESTED, MESHES };
@@ -90,9 +91,9 @@ static hgrid_mesh linked(void)
 static hgrid_mesh nested(void)
 {
     hgrid_mesh all = crowded(0);
-    for (uint32_t i = 0; i < DIVISIONS + CORE; i++) {
-        const bool is_core = i >= DIVISIONS;
-        const float scale = ldexpf(1, -6 * (is_core ? DIVISIONS : (int)i));
+    for (uint32_t i = 0; i < OUTER + CORE; i++) {
+        const bool is_core = i >= OUTER;
+        const float scale = ldexpf(1, -6 * (is_core ? OUTER : (int)i));
         float center[3];
         for (int axis = 0; axis < 3; axis++)
             center[axis] = is_core ? scale * (0.5f + 0.5f * random_number()) : scale;
@@ -103,7 +104,7 @@ static hgrid_mesh nested(void)
                 positions[vertex][axis] = center[axis] + 0.001f * scale * random_number();
         }
     }
-    all.vertex_count += (DIVISIONS + CORE) * 3, all.triangle_count += DIVISIONS + CORE;
+    all.vertex_count += (OUTER + CORE) * 3, all.triangle_count += OUTER + CORE;
     return all;
 }
 

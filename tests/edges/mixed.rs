@@ -16,6 +16,7 @@ const fn most(fast: u64, high: u64) -> [(Quality, u64); 2] {
 /// those of brute force and that no ray tests more than `tests` triangles, by the quality of the tree.
 fn agrees(mesh: &Mesh, tests: [(Quality, u64); 2]) {
     let view = mesh.view();
+    assert_eq!(tests.len(), Quality::ALL.len());
     for (quality, tests) in tests {
         let owned = Owned::build(&view, &Parameters::Bvh { quality }.into()).unwrap();
         let grid = owned.open(&view).unwrap();

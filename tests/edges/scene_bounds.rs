@@ -34,8 +34,8 @@ fn hold(ray: &RayF64, work: &Counters, bound: [u64; 3]) {
 }
 
 /// Walks of a grid whose filter rejects everything: for 1, 2, 4 and 8 hits, one for each sixteen after them, and one
-/// that finds the rest.
-const WALKS: u64 = 5 + TRIANGLES as u64 / 16 + 1;
+/// that finds fewer than sixteen or none.
+const WALKS: u64 = 4 + (TRIANGLES as u64 - 15) / 16 + 1;
 
 /// Counts what a query of so many rays does in a scene whose filter rejects everything.
 fn work_of_a_filter(ask: impl FnOnce(&mut SceneOptions<'_>)) -> Counters {
@@ -46,8 +46,8 @@ fn work_of_a_filter(ask: impl FnOnce(&mut SceneOptions<'_>)) -> Counters {
     work
 }
 
-/// Asks with a filter about each ray alone, and about all in batches, which do no more. Returns the part of the bound
-/// that the ray with the most tests reaches.
+/// Asks with a filter about each ray alone, and about all in batches, which do the same work. Returns the part of the
+/// bound that the ray with the most tests reaches.
 fn filters_hold(scene: &Scene<'_>, rays: &[RayF64], bound: [u64; 3]) -> f64 {
     let mut most = 0.0_f64;
     for is_any in [false, true] {

@@ -78,7 +78,7 @@ fn one_centre(count: usize) -> Mesh {
 }
 
 /// Returns a mesh in which each halving of space leaves all triangles but one in one half: nodes have seven
-/// leaves of one triangle each, and all roots (the subtrees below the top tree) are as small as they can be.
+/// leaves of one triangle each, and all subtrees are as small as they can be.
 fn one_by_one(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..count {
