@@ -43,7 +43,10 @@ impl Ratio {
     /// Returns all ratios for which the scene's systems have numbers.
     #[must_use]
     pub fn all(systems: &[SystemNumbers]) -> Vec<Self> {
-        let (peers, methods): (Vec<_>, Vec<_>) = systems.iter().partition(|system| system.is_peer);
+        let (mut peers, methods): (Vec<_>, Vec<_>) =
+            systems.iter().partition(|system| system.is_peer);
+        // A structure that is wrong in all modes of a workload may have left out what is hard to build.
+        peers.retain(|peer| peer.runs.iter().all(|run| peer.best(run.workload).is_some()));
         let is_default = |system: &&&SystemNumbers| is_default(&system.system);
         let Some(&hgrid) = methods.iter().find(is_default).or(methods.first()) else {
             return Vec::new();
@@ -326,6 +329,21 @@ mod tests {
         is("random", [&with("batch"), "embree-low, packet8"], 1.5);
         assert!(ratios.iter().all(|ratio| !ratio.what.contains("bounces")));
         assert!(Ratio::all(&systems[2..]).is_empty() && Ratio::all(&systems[..2]).is_empty());
+    }
+
+    #[test]
+    fn a_peer_that_is_wrong_in_a_workload_has_no_rows() {
+        let count = |differing: u64| {
+            let with = |name, differing| {
+                let ao: Timed<'_> = (Workload::Ao, Mode::Single, &[1.0], 0);
+                let run: Timed<'_> = (Workload::Primary, Mode::Single, &[1.0], differing);
+                system(name, &[1.0], &[ao, run])
+            };
+            let systems = [with(Method::default().name(), 0), with("embree-low", differing)];
+            Ratio::all(&systems).len()
+        };
+        assert!(count(0) > 0);
+        assert_eq!(count(900), 0);
     }
 
     #[test]
