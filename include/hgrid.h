@@ -2186,18 +2186,6 @@ bool hgrid_locate(const struct hgrid_grid *grid,
                   uint32_t *triangle);
 
 /**
- * Tells the box of a grid: `corners` becomes six floats, the least x, y and z, then the greatest.
- *
- * It is the box of the mesh, larger by about 1e-5 of its extent, or one around the origin and smaller than 1e-33 if no
- * triangle is finite. Returns true; or returns false and writes nothing, if `grid` or `corners` is NULL or the view is
- * one of zeros.
- *
- * Threads: any number of calls and queries on the same grid at once.
- */
-bool hgrid_box_of(const struct hgrid_grid *grid,
-                  float *corners);
-
-/**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but faster.
  *
@@ -2680,16 +2668,6 @@ hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
                                      const struct hgrid_query_options *options);
 
 /**
- * Tells the box of all shapes: `hgrid_box_of` for a tree of shapes.
- *
- * Returns true; or returns false and writes nothing, if `shapes` or `corners` is NULL or the view is one of zeros.
- *
- * Threads: any number of calls and queries on the same tree at once.
- */
-bool hgrid_box_of_shapes(const struct hgrid_shapes *shapes,
-                         float *corners);
-
-/**
  * Makes an object of a grid. The object keeps the address of this view, so the view stays where it is for as long as
  * scenes that show the object are queried.
  *
@@ -2930,16 +2908,6 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
                           const struct hgrid_scene_options *options);
 
 /**
- * Tells the box of all instances: `hgrid_box_of` for a scene.
- *
- * Returns true; or returns false and writes nothing, if `scene` or `corners` is NULL or the view is one of zeros.
- *
- * Threads: any number of calls and queries on the same scene at once.
- */
-bool hgrid_box_of_scene(const struct hgrid_scene *scene,
-                        float *corners);
-
-/**
  * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
  * that it shows.
  *
@@ -3097,6 +3065,38 @@ hgrid_status hgrid_occluded_scene_n(const struct hgrid_scene *scene,
                                     size_t count,
                                     hgrid_coherence coherence,
                                     const struct hgrid_scene_options *options);
+
+/**
+ * Tells the box of a grid: `corners` becomes six floats, the least x, y and z, then the greatest.
+ *
+ * It is the box of the mesh, larger by about 1e-5 of its extent, or one around the origin and smaller than 1e-33 if no
+ * triangle is finite. Returns true; or returns false and writes nothing, if `grid` or `corners` is NULL or the view is
+ * one of zeros.
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ */
+bool hgrid_box_of(const struct hgrid_grid *grid,
+                  float *corners);
+
+/**
+ * Tells the box of all shapes: `hgrid_box_of` for a tree of shapes.
+ *
+ * Returns true; or returns false and writes nothing, if `shapes` or `corners` is NULL or the view is one of zeros.
+ *
+ * Threads: any number of calls and queries on the same tree at once.
+ */
+bool hgrid_box_of_shapes(const struct hgrid_shapes *shapes,
+                         float *corners);
+
+/**
+ * Tells the box of all instances: `hgrid_box_of` for a scene.
+ *
+ * Returns true; or returns false and writes nothing, if `scene` or `corners` is NULL or the view is one of zeros.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ */
+bool hgrid_box_of_scene(const struct hgrid_scene *scene,
+                        float *corners);
 
 #if defined(HGRID_MALLOC)
 /**

@@ -3,9 +3,9 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`, `scene_batch`,
-//! `scene_surface`, `status` and `version` hold the functions, `types`, `query_types` and `blob_types` the structs,
-//! and `raw` every use of a caller's pointer.
+//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`, `scene_path`,
+//! `scene_surface`, `scene_batch`, `box_of`, `status` and `version` hold the functions, `types`, `query_types` and
+//! `blob_types` the structs, and `raw` every use of a caller's pointer.
 //!
 //! This package allocates nothing, starts no thread, and has no panic that a caller could reach; a test looks in the
 //! library for symbols of these. Its only state is a byte in which core remembers which vector instructions the
@@ -40,6 +40,8 @@ mod scene_surface;
 
 mod scene_batch;
 
+mod box_of;
+
 #[cfg(feature = "malloc")]
 mod create;
 
@@ -64,6 +66,7 @@ mod system;
 pub use crate::batch::*;
 pub use crate::blob::*;
 pub use crate::blob_types::*;
+pub use crate::box_of::*;
 pub use crate::build::*;
 #[cfg(feature = "malloc")]
 pub use crate::create::*;

@@ -312,24 +312,3 @@ pub unsafe extern "C" fn hgrid_locate(
     unsafe { raw::write(to_triangle, triangle) };
     true
 }
-
-/// Tells the box of a grid: `corners` becomes six floats, the least x, y and z, then the greatest.
-///
-/// It is the box of the mesh, larger by about 1e-5 of its extent, or one around the origin and smaller than 1e-33 if no
-/// triangle is finite. Returns true; or returns false and writes nothing, if `grid` or `corners` is NULL or the view is
-/// one of zeros.
-///
-/// Threads: any number of calls and queries on the same grid at once.
-///
-/// # Safety
-/// Pointers are as the head of this file says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_box_of(grid: *const hgrid_grid, corners: *mut f32) -> bool {
-    let Some(to) = NonNull::new(corners.cast::<[[f32; 3]; 2]>()) else { return false };
-    // SAFETY: the caller's promise.
-    let Ok(grid) = (unsafe { raw::grid(grid) }) else { return false };
-    let (least, greatest) = grid.bounds();
-    // SAFETY: the caller's promise: six floats.
-    unsafe { raw::write(to, [least, greatest]) };
-    true
-}

@@ -580,22 +580,3 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
     // SAFETY: the caller's promise.
     matches!(unsafe { raw::query_scene(scene, ray, options, true) }, Ok(Some(_)))
 }
-
-/// Tells the box of all instances: `hgrid_box_of` for a scene.
-///
-/// Returns true; or returns false and writes nothing, if `scene` or `corners` is NULL or the view is one of zeros.
-///
-/// Threads: any number of calls and queries on the same scene at once.
-///
-/// # Safety
-/// Pointers are as the head of this file says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_box_of_scene(scene: *const hgrid_scene, corners: *mut f32) -> bool {
-    let Some(to) = NonNull::new(corners.cast::<[[f32; 3]; 2]>()) else { return false };
-    // SAFETY: the caller's promise.
-    let Ok(scene) = (unsafe { raw::scene(scene) }) else { return false };
-    let (least, greatest) = scene.bounds();
-    // SAFETY: the caller's promise: six floats.
-    unsafe { raw::write(to, [least, greatest]) };
-    true
-}

@@ -365,25 +365,3 @@ pub unsafe extern "C" fn hgrid_occluded_shapes_n(
     };
     call().err().unwrap_or(HGRID_OK)
 }
-
-/// Tells the box of all shapes: `hgrid_box_of` for a tree of shapes.
-///
-/// Returns true; or returns false and writes nothing, if `shapes` or `corners` is NULL or the view is one of zeros.
-///
-/// Threads: any number of calls and queries on the same tree at once.
-///
-/// # Safety
-/// Pointers are as the head of this file says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_box_of_shapes(
-    shapes: *const hgrid_shapes,
-    corners: *mut f32,
-) -> bool {
-    let Some(to) = NonNull::new(corners.cast::<[[f32; 3]; 2]>()) else { return false };
-    // SAFETY: the caller's promise.
-    let Ok(shapes) = (unsafe { raw::shapes(shapes) }) else { return false };
-    let (least, greatest) = shapes.shapes.bounds();
-    // SAFETY: the caller's promise: six floats.
-    unsafe { raw::write(to, [least, greatest]) };
-    true
-}
