@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use comfy_table::{Cell, CellAlignment, Table};
 use serde::Deserialize;
 
-use crate::compare::ratios::is_of_best;
+use crate::compare::ratios::has_best_peer;
 use crate::machine::Machine;
 use crate::measure::ratio;
 use crate::table::{count, display_name, markdown, seconds};
@@ -98,7 +98,7 @@ impl Scene {
     /// Returns the ratios, except for those to a best peer in results that are older than the rule for these.
     fn ratios(&self) -> impl Iterator<Item = &Ratio> {
         let systems: Vec<_> = self.systems.iter().map(|system| &*system.system).collect();
-        self.ratios.iter().filter(move |ratio| is_of_best(&ratio.what, &systems))
+        self.ratios.iter().filter(move |ratio| has_best_peer(&ratio.what, &systems))
     }
 
     /// Returns the number of triangles or spheres, and that of instances if there are any.

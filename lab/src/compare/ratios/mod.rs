@@ -54,7 +54,7 @@ impl Ratio {
         let builds = builds(hgrid, &peers);
         let ratios = builds.into_iter().chain(queries(hgrid, &peers)).flatten();
         let names: Vec<_> = systems.iter().map(|system| &*system.system).collect();
-        ratios.filter(|ratio| is_of_best(&ratio.what, &names)).collect()
+        ratios.filter(|ratio| has_best_peer(&ratio.what, &names)).collect()
     }
 
     fn new(what: String, ours: &Entry<'_>, theirs: &Entry<'_>) -> Option<Self> {
@@ -78,7 +78,7 @@ impl Ratio {
 
 /// Returns false for a row with a best peer if Embree took part, but not in a way that is best in such a row.
 #[must_use]
-pub fn is_of_best(what: &str, systems: &[&str]) -> bool {
+pub fn has_best_peer(what: &str, systems: &[&str]) -> bool {
     let best = if what.contains("bytes") {
         [Peer::EmbreeCompact, Peer::EmbreeLowCompact]
     } else {
