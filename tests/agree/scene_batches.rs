@@ -60,7 +60,7 @@ fn compare(scene: &Scene<'_>, rays: &[RayF64]) -> usize {
         }
         let expected: Vec<_> =
             alone.iter().map(|hit| bits(&hit.unwrap_or(SceneHit::MISS))).collect();
-        let blocked: Vec<u8> = alone.iter().map(|hit| hit.is_some().into()).collect();
+        let blocked: Vec<u8> = alone.iter().map(|hit| u8::from(hit.is_some())).collect();
         let mut memory = vec![0; 16 * rays.len() + 16];
         for level in SimdLevel::available() {
             let scene = scene.with_simd(level);
