@@ -371,6 +371,7 @@ static int ask(const hgrid_config *config, const char *mesh_name, const char *na
 }
 
 #ifndef SUMS_TINY
+#include "crowd_sums.h"
 #include "scene_sums.h"
 #endif
 
@@ -406,6 +407,9 @@ int sums(void)
     }
 #ifndef SUMS_TINY
     if (hgrid_has_method(HGRID_METHOD_BVH)) {
+        const int of_crowd = ask_crowd();
+        if (of_crowd)
+            return 900 + of_crowd;
         const int failure = ask_scenes();
         if (failure)
             return 1000 + failure;

@@ -102,11 +102,15 @@ fn work_is_what_it_was() {
     // On a plane, and small enough to be subdivided again.
     let mut crowd = soup(500, 0.05, 3);
     crowd.append(&soup(1500, 0.05, 5).scaled(2e-3));
+    // A small object in one bin of a tree, with a few of the other triangles.
+    let mut object = soup(5000, 0.05, 7).map(|p| p.map(|c| 0.01 * c + 0.3));
+    object.append(&soup(200, 0.05, 9));
     let scenes = [
         ("knot", Mesh { positions, indices }),
         ("ball", ball(16, 1.0)),
         ("soup", soup(3000, 0.05, 1)),
         ("crowd", crowd.map(|[x, _, z]| [x, 0.0, z])),
+        ("object", object),
     ];
     let mut table = String::from(
         "scene    method     resolution    bytes  hits   tests   steps  grids longest content          words\n",

@@ -18,17 +18,9 @@ use crate::invariant::OrBug;
 use crate::mesh::{TriangleMesh, WideMesh, vector};
 use crate::simd::{HAS_VECTORS, Kernel};
 
-use super::key::Keys;
+use super::crowd_key::{CrowdKeys, CrowdPart};
 use super::layout::Entry;
 use super::subtree::slow_bounds;
-
-/// Entries of a crowded unit, and room for two numbers for each of them.
-#[derive(Debug)]
-pub(crate) struct CrowdPart<'w> {
-    pub(crate) entries: &'w mut [Entry],
-    pub(crate) xs: &'w mut [u32],
-    pub(crate) ys: &'w mut [u32],
-}
 
 /// Finds the box around the centres of the triangles' boxes. Stores min + max of each box (twice the centre): x and
 /// y in the room for them, z in place of the key. Out of line: few units are crowded, and inlined it would slow down
@@ -54,7 +46,7 @@ pub(crate) fn centers(mesh: &TriangleMesh<'_>, parts: &mut [CrowdPart<'_>]) -> A
 /// Gives entries new keys, from the sums that [`centers`] stored, and counts those of each bin.
 pub(crate) struct NewKeys<'w> {
     pub(crate) part: CrowdPart<'w>,
-    pub(crate) rule: &'w Keys,
+    pub(crate) rule: &'w CrowdKeys,
     /// Number of low key bits that do not choose a bin.
     pub(crate) shift: u32,
     pub(crate) counts: &'w mut [u32],
@@ -99,7 +91,7 @@ fn numbers<S: Simd>(simd: S, bits: [u32; LANES]) -> f32x8<S> {
 
 /// Gives new keys to fewer than eight entries, or to those of machines without vectors.
 #[inline(never)]
-fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
+fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &CrowdKeys) {
     for ((entry, &x), &y) in entries.iter_mut().zip(xs).zip(ys) {
         let twice = [x, y, entry[0]].map(f32::from_bits);
         entry[0] = rule.of_twice(Vec3A::from_array(twice));
@@ -161,10 +153,13 @@ mod tests {
         let entries: Vec<Entry> = ids.iter().map(|&id| [7, id]).collect();
         let (mut noted, mut xs, mut ys) = (entries.clone(), ids.to_vec(), ids.to_vec());
         let part = CrowdPart { entries: &mut noted, xs: &mut xs, ys: &mut ys };
-        let rule = Keys::new(&centers(mesh, &mut [part]));
+        let mut parts = [part];
+        let centers = centers(mesh, &mut parts);
+        let rule = CrowdKeys::new(&parts, &centers);
         let (mut expected, mut expected_counts) = (entries.clone(), [0; 64]);
         for [key, id] in &mut expected {
-            *key = rule.of(&Aabb::of(mesh.corners(*id).unwrap()).unwrap());
+            let Aabb { min, max } = Aabb::of(mesh.corners(*id).unwrap()).unwrap();
+            *key = rule.of_twice(min + max);
             expected_counts[(*key >> shift) as usize] += 1;
         }
         for level in SimdLevel::available() {

@@ -1,11 +1,11 @@
 //! Keys of triangles: the Morton code of the cell in which the centre of the box lies.
 //!
-//! A cube around the box of the mesh, or around the centres of a divided bin, is cut into 1024 cells an axis; the ten
-//! bits of each axis are interleaved, x highest. Sorted by key, triangles are in the order of a grid of grids of grids:
-//! cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
+//! A cube around the box of the mesh, or around centres of a divided bin ([`crowd_key`](super::crowd_key)), is cut into
+//! 1024 cells an axis; the ten bits of each axis are interleaved, x highest. Sorted by key, triangles are in the order
+//! of a grid of grids of grids: cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
@@ -26,10 +26,12 @@ pub(crate) struct Keys {
     origin: Vec3A,
     /// Cells per unit, halved because positions are doubled.
     scale: f32,
+    /// The largest position on an axis, half a cell into the last cell.
+    end: f32,
 }
 
-/// The largest position on an axis, half a cell into the last cell.
-const END: f32 = 1023.5;
+/// Cells on an axis.
+const CELLS: f32 = 1024.0;
 const CELL_BITS: u32 = 0x3ff;
 
 impl Keys {
@@ -37,10 +39,10 @@ impl Keys {
     pub(crate) fn new(centers: &Aabb) -> Self {
         let extent = centers.size().max_element();
         // Keep it finite: zero times infinity is a NaN.
-        let scale = (512.0 / extent).min(MOST_SCALE);
+        let scale = (0.5 * CELLS / extent).min(MOST_SCALE);
         let is_box = extent >= 0.0;
         let origin = if is_box { centers.min + centers.min } else { Vec3A::ZERO };
-        Self { origin, scale: if is_box { scale } else { 0.0 } }
+        Self { origin, scale: if is_box { scale } else { 0.0 }, end: CELLS - 0.5 }
     }
 
     /// The key of a box.
@@ -52,13 +54,41 @@ impl Keys {
     inline_unless_small! {
         /// The key of a box, given min + max.
         pub(crate) fn of_twice(&self, twice: Vec3A) -> u32 {
-            let cell = (twice - self.origin) * self.scale;
-            let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
-            let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
-                .to_array()
-                .map(|cell| spread(cell.to_bits() & CELL_BITS));
-            x << 2 | y << 1 | z
+            interleave(self.position(twice).max(Vec3A::ZERO).min(Vec3A::splat(self.end)))
         }
+    }
+
+    /// The keys in a grid of half as many cells an axis, each twice as wide.
+    pub(crate) fn halved(self) -> Self {
+        Self { scale: 0.5 * self.scale, end: 0.5 * CELLS - 0.5, ..self }
+    }
+
+    #[inline(always)]
+    fn position(&self, twice: Vec3A) -> Vec3A {
+        (twice - self.origin) * self.scale
+    }
+
+    /// Returns true if a centre lies in the grid, given min + max of the box.
+    pub(crate) fn contain(&self, twice: Vec3A) -> bool {
+        let position = self.position(twice);
+        (position.cmpge(Vec3A::ZERO) & position.cmple(Vec3A::splat(self.end))).all()
+    }
+
+    /// Finds which of eight centres lie in the grid, as [`contain`](Self::contain).
+    #[inline(always)]
+    pub(crate) fn contain_eight<S: Simd>(&self, simd: S, twice: [f32x8<S>; 3]) -> mask32x8<S> {
+        let (zero, end) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, self.end));
+        let x = self.positions(simd, 0, twice[0]);
+        let y = self.positions(simd, 1, twice[1]);
+        let z = self.positions(simd, 2, twice[2]);
+        let not_before = x.simd_ge(zero) & y.simd_ge(zero) & z.simd_ge(zero);
+        not_before & x.simd_le(end) & y.simd_le(end) & z.simd_le(end)
+    }
+
+    #[inline(always)]
+    fn positions<S: Simd>(&self, simd: S, axis: usize, twice: f32x8<S>) -> f32x8<S> {
+        let origin = f32x8::splat(simd, self.origin[axis]);
+        (twice - origin) * f32x8::splat(simd, self.scale)
     }
 
     /// The keys of eight centres: of each the same as [`of_twice`](Self::of_twice).
@@ -72,19 +102,32 @@ impl Keys {
 
     #[inline(always)]
     fn axis<S: Simd>(&self, simd: S, axis: usize, twice: f32x8<S>) -> u32x8<S> {
-        let origin = f32x8::splat(simd, self.origin[axis]);
-        let cell = (twice - origin) * f32x8::splat(simd, self.scale);
-        let cell = cell.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, END));
-        let mut bits = ((cell - 0.5) + WHOLE_SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
-        bits = (bits | bits << 16) & 0x0300_00ff;
-        bits = (bits | bits << 8) & 0x0300_f00f;
-        bits = (bits | bits << 4) & 0x030c_30c3;
-        (bits | bits << 2) & 0x0924_9249
+        let position = self.positions(simd, axis, twice);
+        spread_eight(position.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, self.end)))
     }
+}
+
+/// The Morton code of a position in cells.
+#[inline(always)]
+fn interleave(position: Vec3A) -> u32 {
+    let [x, y, z] = ((position - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
+        .to_array()
+        .map(|cell| spread(cell.to_bits() & CELL_BITS));
+    x << 2 | y << 1 | z
 }
 
 /// The largest scale for which a coordinate's cell is finite.
 const MOST_SCALE: f32 = 1e38;
+
+/// The cells of eight positions, each as ten bits with two zeros before each.
+#[inline(always)]
+fn spread_eight<S: Simd>(position: f32x8<S>) -> u32x8<S> {
+    let mut bits = ((position - 0.5) + WHOLE_SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
+    bits = (bits | bits << 16) & 0x0300_00ff;
+    bits = (bits | bits << 8) & 0x0300_f00f;
+    bits = (bits | bits << 4) & 0x030c_30c3;
+    (bits | bits << 2) & 0x0924_9249
+}
 
 /// Ten bits with two zeros before each.
 #[inline(always)]

@@ -17,8 +17,8 @@
 //!
 //! ```text
 //! format         node, fine, layout, validate
-//! build          build: census (key), scatter, units, crowd, sort, subtrees (subtree), top, index; high/ for `high`;
-//!                parts (sah) for top and high/
+//! build          build: census (key), scatter, units, crowd (crowd_key), sort, subtrees (subtree), top, index;
+//!                high/ for `high`; parts (sah) for top and high/
 //! one ray        search, walk (slab, stack; shape_leaf for shapes)
 //! batches        batch: order, rays (per_ray), group (boxes, met, group_leaf), interleave
 //! points         nearest
@@ -32,7 +32,7 @@
 //! - An *entry* is the key and the id of a triangle ([`layout::Entry`]).
 //! - A *unit* is a bin, or several that follow one another, whose entries are split into subtrees together ([`units`]).
 //! - A bin is *crowded* if it has more than [`CROWD`](layout::CROWD) entries. It is a unit of its own. With more than
-//!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, in the box around its centres ([`crowd`]).
+//!   [`MOST_UNIT`](layout::MOST_UNIT) entries it is divided: binned again, by keys of its own ([`crowd`]).
 //! - A *subtree* holds the entries of a part of a unit ([`subtrees`]). A *root* is the top node of a subtree; the top
 //!   node of the whole tree is called the root of the tree.
 //! - A *seam* is a place between units where a task may end ([`units::is_seam`]).
@@ -46,6 +46,7 @@ mod boxes;
 mod build;
 mod census;
 mod crowd;
+mod crowd_key;
 mod fine;
 mod group;
 mod group_leaf;

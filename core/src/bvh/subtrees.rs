@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side with enough triangles for a subtree):
-//!     too large to sort: new keys in the box around its centres, new bins; then their units
+//!     too large to sort: new keys and bins in the box around its centres; then their units
 //!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
@@ -31,10 +31,10 @@ use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
 use crate::tasks::take;
 
-use super::crowd::{self, CrowdPart, NewKeys, sort_by_bin};
-use super::key::{KEY_BITS, Keys};
+use super::crowd::{self, NewKeys, sort_by_bin};
+use super::crowd_key::{CrowdKeys, CrowdPart};
 use super::layout::{
-    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_SUBTREE, MOST_UNIT, TRIANGLES_PER_SUBTREE, bin_bits,
+    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_SUBTREE, MOST_UNIT, TRIANGLES_PER_SUBTREE,
 };
 use super::node::{LEAF, Node, WIDTH};
 use super::sort::sort;
@@ -206,12 +206,23 @@ impl Subtrees<'_> {
 
     /// Bins a crowded unit by keys of its own, and makes the subtrees of its units.
     fn divide(&mut self, range: Range<usize>, centers: &Aabb, depth: u32) {
-        let bits = bin_bits(range.len() as u64).min(KEY_BITS);
-        let shift = KEY_BITS - bits;
-        self.bin(range.clone(), centers, bits);
-        let mut budget = SubtreeBudget::default();
+        let rule = &CrowdKeys::new(&self.crowd(&range).0, centers);
+        // No more bins than the tree has: there are counts for so many.
+        let most = self.counts.len().checked_ilog2().or_bug("no counts").unwrap_or(0);
+        let bits = rule.bin_bits(range.len()).min(most);
+        let shift = rule.bits() - bits;
+        self.bin(range.clone(), rule, bits);
+
+        let (mut budget, mut in_dense_box) = (SubtreeBudget::default(), false);
         let mut start = range.start;
         while start < range.end {
+            let first = self.entries.get(start).map_or(0, |entry| entry[0]);
+            if rule.in_dense_box(first) != in_dense_box {
+                // Start the balance again. What so many entries in the dense box left would give each of the few others
+                // a subtree of its own.
+                budget = SubtreeBudget::default();
+                in_dense_box = !in_dense_box;
+            }
             let mut end = self.bin_end(start..range.end, shift);
             if end - start <= CROWD {
                 // Seams are counted from the first entry of the tree, not from that of this task.
@@ -227,12 +238,11 @@ impl Subtrees<'_> {
         }
     }
 
-    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: nested
-    /// divisions would each keep its variables on the stack.
+    /// Sorts a crowded unit into `2^bits` bins, by keys of its own. Out of line, as [`sort`]: nested divisions would each
+    /// keep its variables on the stack.
     #[inline(never)]
-    fn bin(&mut self, range: Range<usize>, centers: &Aabb, bits: u32) {
-        let rule = &Keys::new(centers);
-        let shift = KEY_BITS - bits;
+    fn bin(&mut self, range: Range<usize>, rule: &CrowdKeys, bits: u32) {
+        let shift = rule.bits() - bits;
 
         // Find new keys, and count those of each bin.
         let simd_level = self.simd_level;
