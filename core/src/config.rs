@@ -54,7 +54,7 @@ pub enum Parameters {
     Recursive {
         /// Cells per primitive.
         density: f32,
-        /// Levels of grids, 1 to [`MAX_DEPTH`](crate::MAX_DEPTH).
+        /// Levels of grids, 1 to [`MAX_DEPTH`].
         depth: u32,
     },
     /// Parameters of [`Method::Bvh`].

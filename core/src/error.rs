@@ -43,7 +43,7 @@ pub enum BatchField {
 /// The field of a [`Config`](crate::Config) that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigField {
-    /// No method of this version; or, for shapes and scenes, another than [`Method::Bvh`](crate::Method::Bvh).
+    /// No method of this version; or, for shapes and scenes, another than [`Method::Bvh`].
     Method,
     /// Zero, negative, NaN, or so large that an axis would need more than [`MAX_RESOLUTION`](limits::MAX_RESOLUTION)
     /// cells (1023 in a recursive grid), or ids and subgrids more than 8 GiB.

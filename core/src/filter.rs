@@ -42,12 +42,12 @@
 //!
 //! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the sheared plane: by
 //! the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 of the corner's distance, and by the distance
-//! between its ray and the line through the anchor ([`Approach::slack`]). If it reports a hit, the corners lie within
-//! 4 E + 3 s of the ray on that plane, as the ray is among them. Moving them changes an edge function by at most
-//! 16 E s + 14 s^2 on the sheared plane. U, V and W are these times |d.z|, which is below 2: z is the axis along which
-//! d is longest. The rest is the second order of u, below 2^-19 of everything, and underflow. Let X be the distance of
-//! the mesh's farthest corner. No corner of the triangle is farther than M, nor than X: 32 E s counts with M, 28 s^2
-//! with X.
+//! between its ray and the line through the anchor ([`slack`](crate::approach::Approach::slack)). If it reports a hit,
+//! the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Moving them changes an edge
+//! function by at most 16 E s + 14 s^2 on the sheared plane. U, V and W are these times |d.z|, which is below 2: z is
+//! the axis along which d is longest. The rest is the second order of u, below 2^-19 of everything, and underflow. Let
+//! X be the distance of the mesh's farthest corner. No corner of the triangle is farther than M, nor than X: 32 E s
+//! counts with M, 28 s^2 with X.
 //!
 //! ```text
 //! K         29 u D                   28 R + 18 E is at most 28 M; 29 for 28: higher orders, 32 * 7 * 2^-53, and the

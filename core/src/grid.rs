@@ -44,7 +44,7 @@ impl<'a> Grid<'a> {
     /// Builds a grid in memory that the caller brings.
     ///
     /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a multiple of
-    /// [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes) tells how large they must be;
+    /// [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes()) tells how large they must be;
     /// more is not used. The same mesh and configuration give the same bits, on every machine of the same byte order.
     /// The stack of a build is below 18 KiB, with more than one task ([`Control`]) below 96 KiB, that of a task below
     /// 13 KiB, beside what the caller's own functions take.

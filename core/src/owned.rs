@@ -308,10 +308,10 @@ impl OwnedGrid {
         &self.mesh
     }
 
-    /// Gives a tree the boxes of a mesh whose vertices moved, and takes that mesh: see [`refit`](crate::refit).
+    /// Gives a tree the boxes of a mesh whose vertices moved, and takes that mesh: see [`refit`](crate::refit()).
     ///
     /// # Errors
-    /// The errors of [`refit`](crate::refit). After an error grid and mesh are as they were.
+    /// The errors of [`refit`](crate::refit()). After an error grid and mesh are as they were.
     pub fn refit(&mut self, mesh: OwnedMesh) -> Result<Refit, Error> {
         let refitted = refit(self.index.bytes_mut(), &mesh.try_view()?)?;
         self.mesh = mesh;

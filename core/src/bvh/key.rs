@@ -2,7 +2,8 @@
 //!
 //! A cube around the box of the mesh, or around centres of a divided bin ([`crowd_key`](super::crowd_key)), is cut into
 //! 1024 cells an axis; the ten bits of each axis are interleaved, x highest. Sorted by key, triangles are in the order
-//! of a grid of grids of grids: cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
+//! of a grid of grids of grids: cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an
+//! axis.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};

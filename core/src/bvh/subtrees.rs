@@ -16,7 +16,7 @@
 //! needed any more, and the same memory is the second buffer when they are sorted by bins.
 //!
 //! The record of a root is 112 bytes, written over entries that were used up:
-//! [`TRIANGLES_PER_SUBTREE`](super::layout::TRIANGLES_PER_SUBTREE) of them for each subtree, 192 bytes.
+//! [`TRIANGLES_PER_SUBTREE`] of them for each subtree, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -238,8 +238,8 @@ impl Subtrees<'_> {
         }
     }
 
-    /// Sorts a crowded unit into `2^bits` bins, by keys of its own. Out of line, as [`sort`]: nested divisions would each
-    /// keep its variables on the stack.
+    /// Sorts a crowded unit into `2^bits` bins, by keys of its own. Out of line, as [`sort`]: nested divisions would
+    /// each keep its variables on the stack.
     #[inline(never)]
     fn bin(&mut self, range: Range<usize>, rule: &CrowdKeys, bits: u32) {
         let shift = rule.bits() - bits;

@@ -3,8 +3,8 @@
 //!
 //! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its own, around the part
 //! of the cell that they reach, if the depth allows it, the grid separates them, and the budget of looks lasts
-//! ([`build`]). Of the four grids this one takes the fewest tests and steps a ray, the longest build and the most
-//! memory.
+//! ([`build`](mod@build)). Of the four grids this one takes the fewest tests and steps a ray, the longest build and the
+//! most memory.
 //!
 //! Departures from Manta: the budget, a density that is halved where references exceed their limit, and margins that
 //! cover rounding.

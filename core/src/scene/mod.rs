@@ -6,7 +6,7 @@
 //!         and move the `t` of what is hit back
 //! ```
 //!
-//! The tree is that of [`Shapes`](crate::Shapes): to it, instances are shapes. Objects are named by number and bound
+//! The tree is that of [`Shapes`]: to it, instances are shapes. Objects are named by number and bound
 //! when a scene is opened, so the blob can be moved like any other. An instance keeps the inverse of its matrix
 //! ([`instance`]).
 

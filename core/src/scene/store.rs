@@ -289,8 +289,8 @@ impl<'a> Scene<'a> {
 
     /// Gives a built scene instances that moved: in place, O(n), without scratch. `index` holds the scene's blob, and
     /// there are as many instances as in the build. Call it also if an object changed and no instance moved: a scene
-    /// keeps the boxes that its objects had. [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the
-    /// scene again afterwards.
+    /// keeps the boxes that its objects had. [`refit`](crate::refit()) says when to build anew; [`open`](Self::open)
+    /// the scene again afterwards.
     ///
     /// # Errors
     /// [`Error::MeshMismatch`] for another number of instances, and those of [`open`](Self::open). After

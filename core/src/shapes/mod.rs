@@ -155,11 +155,11 @@ impl fmt::Debug for Shapes<'_> {
 }
 
 impl<'a> Shapes<'a> {
-    /// The memory that a build over these boxes takes on one thread: [`sizes`](crate::sizes) for shapes. Builds with
+    /// The memory that a build over these boxes takes on one thread: [`sizes`](crate::sizes()) for shapes. Builds with
     /// tasks take more scratch, which [`Sizes::bound_parallel`] counts.
     ///
     /// # Errors
-    /// The errors of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
+    /// The errors of [`sizes`](crate::sizes()); [`Error::InvalidConfig`] if the method is not
     /// [`Method::Bvh`](crate::Method::Bvh), here and in all builds.
     pub fn sizes(boxes: &Boxes<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
         config.check_tree()?;
@@ -218,10 +218,10 @@ impl<'a> Shapes<'a> {
         self.grid.validate_bytes()
     }
 
-    /// Gives a built tree the boxes of shapes that moved: [`refit`](crate::refit) for shapes.
+    /// Gives a built tree the boxes of shapes that moved: [`refit`](crate::refit()) for shapes.
     ///
     /// # Errors
-    /// The errors of [`refit`](crate::refit).
+    /// The errors of [`refit`](crate::refit()).
     pub fn refit(index: &mut [u8], boxes: &Boxes<'_>) -> Result<Refit, Error> {
         refit(index, &boxes.0)
     }
