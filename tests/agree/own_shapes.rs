@@ -98,7 +98,8 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
                         [all[hit.primitive as usize][0], all[hit.primitive as usize][3]]
                     );
                 }
-                assert!(work.primitive_tests as usize <= count && asked.len() <= count);
+                let tested = work.primitive_tests as usize;
+                assert!(asked.len() <= tested && tested <= count, "{} {tested}", asked.len());
                 let mut options = QueryOptions { mask, ..QueryOptions::default() };
                 let mut test = |id: u32, part: &Ray| meet(all[id as usize], part);
                 let is_hit = shapes.occluded_with(&ray, &mut options, &mut test);
