@@ -1,8 +1,9 @@
-//! Gives the triangles of a crowded unit new keys, in the box around their centres.
+//! Gives the triangles of a crowded unit new keys ([`crowd_key`](super::crowd_key)).
 //!
 //! ```text
 //! centers     read each triangle once: store min + max of its box, find the box around all centres
-//! new keys    for eight triangles: keys of their centres in that box; count the bin of each
+//! keys        choose one grid or two, by a sample of the centres
+//! new keys    for eight triangles: keys of their centres; count the bin of each
 //! sort        move each entry to the next place of its bin, in the memory of the centres, then all back
 //!
 //! min + max (twice the centre) is stored: z in the entry, x and y in two arrays

@@ -1,16 +1,19 @@
 //! Keys of a crowded unit.
 //!
 //! A small object often shares its bin with a few triangles of its surroundings. In a grid over the centres of all, it
-//! would lie in one cell or two, which would have to be divided again. So a sample tells whether nearly all centres lie
-//! in a box of a quarter of the length or less, the *dense box*. If so, there are two grids of 512 cells an axis:
+//! would lie in a few cells, which would have to be divided again. So a sample tells whether nearly all centres lie in
+//! a box of less than a quarter of the length, the *dense box*. If so, there are two grids, each over the cube at the
+//! least corner of its box:
 //!
 //! ```text
 //! bit 27 of the key    bits 0 to 26
 //! 0                    the cell of the grid over the dense box
-//! 1                    the cell of the grid over all centres, for those outside of the dense box
+//! 1                    the cell of the grid over all centres, for those that the first grid does not contain
 //! ```
 //!
-//! So no bin holds centres of both kinds. If not, there is one grid of 1024 cells an axis over all centres.
+//! So no bin holds centres of both kinds. Each grid has 512 cells an axis, not 1024: from 8192 entries on, the bits
+//! that do not choose a bin are then sorted in two passes, not in four ([`sort`](super::sort)). If nearly all centres
+//! do not lie so close together, there is one grid of 1024 cells an axis over all of them.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
@@ -37,15 +40,16 @@ pub(crate) struct CrowdKeys {
     dense: Option<Keys>,
 }
 
+/// Bits of a cell in one of two grids.
+const CELL_BITS: u32 = 27;
 /// The bit of the keys of centres outside of the dense box.
-const OUTSIDE_BIT: u32 = 27;
-const OUTSIDE: u32 = 1 << OUTSIDE_BIT;
+const OUTSIDE: u32 = 1 << CELL_BITS;
 
 impl CrowdKeys {
     /// The keys of a unit, given twice its centres and the box around them.
     pub(crate) fn new(parts: &[CrowdPart<'_>], centers: &Aabb) -> Self {
         let (all, dense) = (Keys::new(centers), dense_box(parts));
-        if dense.size().max_element() * SMALLER > centers.size().max_element() {
+        if dense.size().max_element() * SMALLER >= centers.size().max_element() {
             return Self { all, dense: None };
         }
         Self { all: all.halved(), dense: Some(Keys::new(&dense).halved()) }
@@ -53,7 +57,7 @@ impl CrowdKeys {
 
     /// Bits of a key.
     pub(crate) const fn bits(&self) -> u32 {
-        if self.dense.is_some() { OUTSIDE_BIT + 1 } else { KEY_BITS }
+        if self.dense.is_some() { CELL_BITS + 1 } else { KEY_BITS }
     }
 
     /// Bits of a key that choose the bin of one of so many entries. One more where half of the bins are for the few
@@ -62,19 +66,18 @@ impl CrowdKeys {
         bin_bits(entries as u64) + self.dense.is_some() as u32
     }
 
-    /// Returns true if there is a dense box, and the centre with this key lies in it.
-    pub(crate) const fn in_dense_box(&self, key: u32) -> bool {
-        self.dense.is_some() && key & OUTSIDE == 0
+    /// The bit in which the keys of centres in the dense box differ from the others; 0 if there is no dense box.
+    pub(crate) const fn border(&self) -> u32 {
+        if self.dense.is_some() { OUTSIDE } else { 0 }
     }
 
     /// The key of a box, given min + max.
     pub(crate) fn of_twice(&self, twice: Vec3A) -> u32 {
-        let Some(dense) = &self.dense else { return self.all.of_twice(twice) };
-        if dense.contain(twice) {
-            dense.of_twice(twice)
-        } else {
-            self.all.of_twice(twice) | OUTSIDE
-        }
+        let (grid, bit) = match &self.dense {
+            Some(dense) if dense.contain(twice) => (dense, 0),
+            _ => (&self.all, self.border()),
+        };
+        grid.of_twice(twice) | bit
     }
 
     /// The keys of eight centres: of each the same as [`of_twice`](Self::of_twice).
@@ -86,8 +89,8 @@ impl CrowdKeys {
     }
 }
 
-/// The dense box is smaller than that of all centres by this factor or more: then it would lie in two cells of an axis
-/// or fewer where a grid has eight.
+/// The dense box is smaller than that of all centres by more than this factor: less than two cells long where a grid
+/// has eight cells an axis.
 const SMALLER: f32 = 4.0;
 
 /// The number of centres in the sample, about.
@@ -123,6 +126,7 @@ fn dense_box(parts: &[CrowdPart<'_>]) -> Aabb {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
     use alloc::vec::Vec;
 
     use super::*;
@@ -171,13 +175,15 @@ mod tests {
     fn an_object_among_a_few_others_is_divided_once() {
         let twice = centers(10_000, 50);
         let keys = keys(&twice, [0, 0]);
-        assert!(keys.dense.is_some());
-        let mut counts = [0; 512];
+        let bits = keys.bin_bits(twice.len());
+        // As many bins for the object as there would be for all, and as many for the others.
+        assert_eq!((bits, keys.border()), (bin_bits(10_050) + 1, OUTSIDE));
+        let mut counts = vec![0; 1 << bits];
         for &twice in &twice {
             let key = keys.of_twice(twice);
-            counts[(key >> (keys.bits() - 9)) as usize] += 1;
+            counts[(key >> (keys.bits() - bits)) as usize] += 1;
             let is_near = twice.abs().max_element() <= 1.0;
-            assert_eq!(keys.in_dense_box(key), is_near, "{twice}");
+            assert_eq!(key & OUTSIDE == 0, is_near, "{twice}");
         }
         assert!(counts.iter().all(|&count| count <= CROWD));
     }
@@ -217,18 +223,34 @@ mod tests {
         }
     }
 
+    /// Checks the keys of eight centres at once against those of each.
+    fn check(keys: &CrowdKeys, twice: &[Vec3A]) {
+        for eight in twice.as_chunks::<8>().0.iter().step_by(if cfg!(miri) { 50 } else { 1 }) {
+            let expected = eight.map(|twice| keys.of_twice(twice));
+            assert!(expected.iter().all(|key| key >> keys.bits() == 0));
+            // Machines without vectors never run this kernel.
+            for level in SimdLevel::available().filter(|_| HAS_VECTORS) {
+                assert_eq!(dispatch(level, Eight(keys, *eight)), expected, "{level:?}");
+            }
+        }
+    }
+
     #[test]
     fn every_kind_of_vectors_gives_the_same_keys() {
-        for (object, others) in [(5000, 60), (5000, 0)] {
-            let twice = centers(object, others);
-            let keys = keys(&twice, [0, 0]);
-            assert_eq!(keys.dense.is_some(), others > 0);
-            for eight in twice.as_chunks::<8>().0.iter().step_by(if cfg!(miri) { 50 } else { 1 }) {
-                let expected = eight.map(|twice| keys.of_twice(twice));
-                // Machines without vectors never run this kernel.
-                for level in SimdLevel::available().filter(|_| HAS_VECTORS) {
-                    assert_eq!(dispatch(level, Eight(&keys, *eight)), expected, "{level:?}");
+        for others in [0, 60] {
+            // An object of each size, and one whose centres are the same.
+            for (size, width) in [(1.0, 1.0), (1.0, 0.0), (1e-40, 1e-40), (1e34, 1e34)] {
+                let mut twice = centers(5000, others);
+                for twice in &mut twice {
+                    let is_object = twice.abs().max_element() <= 1.0;
+                    *twice *= if is_object { width } else { size };
                 }
+                let keys = keys(&twice, [0, 0]);
+                assert_eq!(keys.dense.is_some(), others > 0);
+                if let Some(dense) = &keys.dense {
+                    twice.splice(..16, dense.ends());
+                }
+                check(&keys, &twice);
             }
         }
     }

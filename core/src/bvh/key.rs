@@ -1,9 +1,9 @@
 //! Keys of triangles: the Morton code of the cell in which the centre of the box lies.
 //!
 //! A cube around the box of the mesh, or around centres of a divided bin ([`crowd_key`](super::crowd_key)), is cut into
-//! 1024 cells an axis; the ten bits of each axis are interleaved, x highest. Sorted by key, triangles are in the order
-//! of a grid of grids of grids: cells that share their first `3 k` bits share a cell of the grid of `2^k` cells an
-//! axis.
+//! 1024 cells an axis, or 512 ([`halved`](Keys::halved)); the bits of each axis are interleaved, x highest. Sorted by
+//! key, triangles are in the order of a grid of grids of grids: cells that share their first `3 k` bits share a cell of
+//! the grid of `2^k` cells an axis.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
@@ -14,7 +14,7 @@ use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 use crate::simd::inline_unless_small;
 
-/// Bits of a key.
+/// Bits of a key in a grid of 1024 cells an axis.
 pub(crate) const KEY_BITS: u32 = 30;
 
 /// In place of a key, for a triangle with a corner that is not finite.
@@ -23,15 +23,15 @@ pub(crate) const NO_KEY: u32 = u32::MAX;
 /// The map from boxes to keys.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Keys {
-    /// The least corner of the cube, doubled as positions are.
+    /// The least corner of the cube, doubled as centres are.
     origin: Vec3A,
-    /// Cells per unit, halved because positions are doubled.
+    /// Cells per unit, halved because centres are doubled.
     scale: f32,
     /// The largest position on an axis, half a cell into the last cell.
     end: f32,
 }
 
-/// Cells on an axis.
+/// Cells on an axis, unless halved.
 const CELLS: f32 = 1024.0;
 const CELL_BITS: u32 = 0x3ff;
 
@@ -64,12 +64,13 @@ impl Keys {
         Self { scale: 0.5 * self.scale, end: 0.5 * CELLS - 0.5, ..self }
     }
 
+    /// The cells between the origin and a centre on each axis, given min + max of the box.
     #[inline(always)]
     fn position(&self, twice: Vec3A) -> Vec3A {
         (twice - self.origin) * self.scale
     }
 
-    /// Returns true if a centre lies in the grid, given min + max of the box.
+    /// Returns true if a centre lies in the grid, but not in the outer half of a last cell, given min + max of the box.
     pub(crate) fn contain(&self, twice: Vec3A) -> bool {
         let position = self.position(twice);
         (position.cmpge(Vec3A::ZERO) & position.cmple(Vec3A::splat(self.end))).all()
@@ -84,6 +85,17 @@ impl Keys {
         let z = self.positions(simd, 2, twice[2]);
         let not_before = x.simd_ge(zero) & y.simd_ge(zero) & z.simd_ge(zero);
         not_before & x.simd_le(end) & y.simd_le(end) & z.simd_le(end)
+    }
+
+    /// Twice the centres at both ends of the grid's diagonal, and those next to them.
+    #[cfg(test)]
+    pub(crate) fn ends(&self) -> [Vec3A; 16] {
+        let last = self.origin + self.end / self.scale;
+        core::array::from_fn(|i| {
+            let end = if i % 2 == 0 { self.origin } else { last };
+            let step: fn(f32) -> f32 = [f32::next_down, |x| x, f32::next_up][i / 2 % 3];
+            Vec3A::from_array(end.to_array().map(step))
+        })
     }
 
     #[inline(always)]
@@ -117,7 +129,8 @@ fn interleave(position: Vec3A) -> u32 {
     x << 2 | y << 1 | z
 }
 
-/// The largest scale for which a coordinate's cell is finite.
+/// The largest scale for which a coordinate's cell is finite in the box. The positions of centres outside may be
+/// infinite.
 const MOST_SCALE: f32 = 1e38;
 
 /// The cells of eight positions, each as ten bits with two zeros before each.

@@ -1,7 +1,7 @@
 //! A bounding volume hierarchy with eight children a node.
 //!
 //! Quality `fast` builds it from a grid of the triangles' centres, quality `high` by SAH over single triangles
-//! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get a finer grid of their
+//! ([`high`]). In the grid, every triangle belongs to one cell, by its centre; crowded cells get finer grids of their
 //! own. Cells in Morton order are split into small subtrees, with a tree by SAH above them. A node keeps the boxes of
 //! up to eight children in eight bits a side. Some nodes, mostly those with a thin child, keep them as f32, too
 //! ([`fine`]). A leaf keeps up to eight ids. Triangles stay in the caller's mesh.

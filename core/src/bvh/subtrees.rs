@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side with enough triangles for a subtree):
-//!     too large to sort: new keys and bins in the box around its centres; then their units
+//!     too large to sort: new keys, in one grid or two over its centres, and new bins; then their units
 //!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
@@ -52,6 +52,14 @@ pub(crate) struct RootRecord {
     pub(crate) count: u32,
     /// Levels of nodes.
     pub(crate) levels: u32,
+}
+
+/// The keys that a crowded unit was binned by.
+struct Binned {
+    /// Number of low key bits that do not choose a bin.
+    shift: u32,
+    /// The bit in which entries in the dense box differ from the others; 0 if there is no dense box.
+    border: u32,
 }
 
 /// A record in entries.
@@ -206,22 +214,15 @@ impl Subtrees<'_> {
 
     /// Bins a crowded unit by keys of its own, and makes the subtrees of its units.
     fn divide(&mut self, range: Range<usize>, centers: &Aabb, depth: u32) {
-        let rule = &CrowdKeys::new(&self.crowd(&range).0, centers);
-        // No more bins than the tree has: there are counts for so many.
-        let most = self.counts.len().checked_ilog2().or_bug("no counts").unwrap_or(0);
-        let bits = rule.bin_bits(range.len()).min(most);
-        let shift = rule.bits() - bits;
-        self.bin(range.clone(), rule, bits);
-
-        let (mut budget, mut in_dense_box) = (SubtreeBudget::default(), false);
+        let Binned { shift, border } = self.bin(&range, centers);
+        let (mut budget, mut side) = (SubtreeBudget::default(), 0);
         let mut start = range.start;
         while start < range.end {
             let first = self.entries.get(start).map_or(0, |entry| entry[0]);
-            if rule.in_dense_box(first) != in_dense_box {
-                // Start the balance again. What so many entries in the dense box left would give each of the few others
-                // a subtree of its own.
-                budget = SubtreeBudget::default();
-                in_dense_box = !in_dense_box;
+            if first & border != side {
+                // The balance starts again: with what the many entries of the dense box left, each of the few others
+                // would be a subtree by itself.
+                (budget, side) = (SubtreeBudget::default(), first & border);
             }
             let mut end = self.bin_end(start..range.end, shift);
             if end - start <= CROWD {
@@ -238,31 +239,36 @@ impl Subtrees<'_> {
         }
     }
 
-    /// Sorts a crowded unit into `2^bits` bins, by keys of its own. Out of line, as [`sort`]: nested divisions would
-    /// each keep its variables on the stack.
+    /// Sorts a crowded unit into bins, by keys of its own. Out of line, as [`sort`]: nested divisions would each keep
+    /// its variables on the stack.
     #[inline(never)]
-    fn bin(&mut self, range: Range<usize>, rule: &CrowdKeys, bits: u32) {
+    fn bin(&mut self, range: &Range<usize>, centers: &Aabb) -> Binned {
+        let simd_level = self.simd_level;
+        let (parts, counts) = self.crowd(range);
+        let rule = &CrowdKeys::new(&parts, centers);
+        // No more bins than the tree has: there are counts for so many.
+        let most = counts.len().checked_ilog2().or_bug("no counts").unwrap_or(0);
+        let bits = rule.bin_bits(range.len()).min(most);
         let shift = rule.bits() - bits;
+        let binned = Binned { shift, border: rule.border() };
 
         // Find new keys, and count those of each bin.
-        let simd_level = self.simd_level;
-        let (parts, counts) = self.crowd(&range);
-        let counts = counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
-        let Some(counts) = counts else { return };
+        let Some(counts) = counts.get_mut(..1 << bits) else { return binned };
         counts.fill(0);
         for part in parts {
             dispatch(simd_level, NewKeys { part, rule, shift, counts: &mut *counts });
         }
 
         // Sort the entries by their bins, crowded bins first.
-        let (parts, counts) = self.crowd(&range);
-        let Some(counts) = counts.get_mut(..1 << bits) else { return };
+        let (parts, counts) = self.crowd(range);
+        let Some(counts) = counts.get_mut(..1 << bits) else { return binned };
         let mut next = starts(counts);
         for count in &mut *counts {
             let next = &mut next[usize::from(*count as usize <= CROWD)];
             *next += core::mem::replace(count, *next);
         }
         sort_by_bin(parts, counts, shift);
+        binned
     }
 
     /// Returns the entries of a crowded unit in three parts, with room for two numbers for each, and the counts of all
