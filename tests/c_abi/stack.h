@@ -3,9 +3,10 @@
 enum { CROWDS = 2, CROWD = 17000 };
 /* The triangles of a tangle, and those of them in the chain; those of a chain alone. */
 enum { TANGLE = 1480, CHAIN = 480, LINKED_CHAIN = 400 };
-/* The outer triangles of a nested mesh, and those of its crowd. The bins of the mesh tell one outer triangle from the
- * crowd, and so does each division of the crowd's bin. There are five divisions, as many as a build makes at most. */
-enum { OUTER = 6, CORE = 4500 };
+/* The layers of outer triangles in a nested mesh, and the triangles of its crowd. The bins of the mesh tell one layer
+ * from the crowd, and so does each division of the crowd's bin. There are five divisions, as many as a build makes at
+ * most. A layer is large enough to be in the sample that a division takes: it would pass over a few triangles. */
+enum { LAYERS = 6, LAYER = 200, OUTER = LAYERS * LAYER, CORE = 4500 };
 /* Meshes have the number of their crowds; behind them come a tangle, a chain that makes a tree of few levels, and a
  * nested mesh. */
 enum { TANGLED = CROWDS + 1, LINKED, NESTED, MESHES };
@@ -86,14 +87,14 @@ static hgrid_mesh linked(void)
     return all;
 }
 
-/* Returns the sheet with a crowd near the origin and a triangle far from it; all of that far from another, larger
- * triangle; and so on. */
+/* Returns the sheet with a crowd near the origin and triangles far from it; all of that far from other, larger
+ * triangles; and so on. */
 static hgrid_mesh nested(void)
 {
     hgrid_mesh all = crowded(0);
     for (uint32_t i = 0; i < OUTER + CORE; i++) {
         const bool is_core = i >= OUTER;
-        const float scale = ldexpf(1, -6 * (is_core ? OUTER : (int)i));
+        const float scale = ldexpf(1, -6 * (is_core ? LAYERS : (int)(i / LAYER)));
         float center[3];
         for (int axis = 0; axis < 3; axis++)
             center[axis] = is_core ? scale * (0.5f + 0.5f * random_number()) : scale;

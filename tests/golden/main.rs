@@ -102,7 +102,8 @@ fn work_is_what_it_was() {
     // On a plane, and small enough to be subdivided again.
     let mut crowd = soup(500, 0.05, 3);
     crowd.append(&soup(1500, 0.05, 5).scaled(2e-3));
-    // A small object in one bin of a tree, with a few of the other triangles.
+    // A small object in one bin of a tree, with a few of the other triangles. If each of these few were a subtree by
+    // itself, the blob would be larger.
     let mut object = soup(5000, 0.05, 7).map(|p| p.map(|c| 0.01 * c + 0.3));
     object.append(&soup(200, 0.05, 9));
     let scenes = [

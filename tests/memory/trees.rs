@@ -106,6 +106,24 @@ fn nested(count: usize, depth: i32) -> Mesh {
     mesh
 }
 
+/// Returns a nested mesh with a layer of triangles, not one, at each distance, so that the sample of a division shows
+/// it: no division but the last finds a dense box. If `is_alone`, a triangle lies far outside of each layer. Then each
+/// division finds what lies inside it to be dense, and leaves that triangle.
+fn nested_in_layers(count: usize, depth: i32, is_alone: bool) -> Mesh {
+    let mut mesh = Mesh::default();
+    for level in 0..depth {
+        let at = 4096_f32.powi(-level);
+        if is_alone {
+            around(&mut mesh, [at * 64.0; 3], at * 1e-3);
+        }
+        (0..count / 32).for_each(|_| around(&mut mesh, [at; 3], at * 1e-3));
+    }
+    let inside = 4096_f32.powi(-depth);
+    let few = soup(count.saturating_sub(mesh.indices.len()), 0.01, 7);
+    mesh.append(&few.map(|p| p.map(|c| (c + 1.0) * 0.5 * inside)));
+    mesh
+}
+
 /// Returns several nested meshes side by side.
 fn many_nested(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
@@ -167,6 +185,9 @@ fn the_worst_meshes_stay_within_the_bound() {
     for count in [4095, 4096, 4097, 4319, 4320, 4321, 4400, 8192, 9001, 20_000, 100_000] {
         let mut meshes = vec![one_centre(count), one_by_one(count), many_nested(count)];
         meshes.extend((1..8).map(|depth| nested(count, depth)));
+        meshes.extend((1..8).flat_map(|depth| {
+            [false, true].map(|is_alone| nested_in_layers(count, depth, is_alone))
+        }));
         for mesh in meshes {
             assert_eq!(mesh.indices.len(), count);
             let [nodes, levels] = builds_in_its_bound(&mesh, Quality::Fast);
@@ -265,7 +286,7 @@ fn tasks_do_not_show() {
 #[test]
 #[ignore = "slow: a hundred builds of a hundred thousand triangles"]
 fn tasks_do_not_show_in_other_meshes() {
-    do_tasks_show(&[0, 1, 4, 5]);
+    do_tasks_show(&[0, 1, 4, 5, 6]);
 }
 
 /// Any number of tasks makes the same blob, in scratch for that many tasks, for fewer, and for one. Takes the numbers
@@ -276,8 +297,15 @@ fn do_tasks_show(which: &[usize]) {
     (0..5).for_each(|i| around(&mut behind, [1.0, i as f32, 1.0], 0.01));
     let mut mixed = soup(COUNT / 2, 0.01, 3);
     mixed.append(&many_nested(COUNT - COUNT / 2));
-    let meshes =
-        [soup(COUNT, 0.01, 1), behind, mixed, crowds(COUNT), one_centre(COUNT), nested(COUNT, 4)];
+    let meshes = [
+        soup(COUNT, 0.01, 1),
+        behind,
+        mixed,
+        crowds(COUNT),
+        one_centre(COUNT),
+        nested(COUNT, 4),
+        nested_in_layers(COUNT, 4, true),
+    ];
     let qualities = Quality::ALL.iter().map(|&quality| config(quality));
     let all = meshes.iter().enumerate().filter(|(number, _)| which.contains(number));
     for ((number, mesh), config) in all.flat_map(|mesh| qualities.clone().map(move |of| (mesh, of)))

@@ -148,14 +148,14 @@ mod tests {
     }
 
     /// The bound of [`layout`](crate::bvh::layout) has room for the most nodes that its rules allow. Each crowd here is
-    /// divided [`DIVISIONS`] times. Each division but the last leaves one triangle behind a crowded bin: a subtree by
-    /// itself. The last one makes subtrees with as many nodes as the budget allows. Above their roots are 4/7 nodes for
-    /// each.
+    /// divided [`DIVISIONS`] times. Each division leaves one triangle that is a subtree by itself: behind a crowded
+    /// bin, the last one outside of a dense box. The last one also makes subtrees with as many nodes as the budget
+    /// allows. Above their roots are 4/7 nodes for each.
     #[test]
     fn the_bound_has_room_for_subtrees_behind_crowded_bins() {
         const CROWDS: usize = 100;
         const INSIDE: usize = MOST_UNIT + 1;
-        let late = DIVISIONS as usize - 1;
+        let late = DIVISIONS as usize;
         let (mut budget, mut start) = (SubtreeBudget::default(), 0);
         let (mut roots, mut below) = (late, 0);
         while start < INSIDE {
