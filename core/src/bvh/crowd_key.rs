@@ -23,7 +23,8 @@ use super::key::{KEY_BITS, Keys};
 use super::layout::{Entry, bin_bits};
 use crate::aabb::Aabb;
 
-/// Entries of a crowded unit, and room for two numbers for each of them.
+/// Entries of a crowded unit, and two numbers for each: x and y of its centre, doubled, once they are known. Until an
+/// entry has a new key, z stands in its place.
 #[derive(Debug)]
 pub(crate) struct CrowdPart<'w> {
     pub(crate) entries: &'w mut [Entry],
@@ -46,7 +47,7 @@ const CELL_BITS: u32 = 27;
 const OUTSIDE: u32 = 1 << CELL_BITS;
 
 impl CrowdKeys {
-    /// The keys of a unit, given twice its centres and the box around them.
+    /// The keys of a unit whose parts hold its centres, doubled, given the box around the centres.
     pub(crate) fn new(parts: &[CrowdPart<'_>], centers: &Aabb) -> Self {
         let (all, dense) = (Keys::new(centers), dense_box(parts));
         if dense.size().max_element() * SMALLER >= centers.size().max_element() {
