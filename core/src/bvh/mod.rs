@@ -207,7 +207,7 @@ impl<'a> Bvh<'a> {
     /// The fine sides of a node, if it has some.
     #[inline(always)]
     fn fine_sides(&self, node: &Node) -> Option<&'a FineSides> {
-        self.fine.get(node.fine_index())
+        if node.has_fine_sides() { self.fine.get(node.fine_index()) } else { None }
     }
 
     /// Passes all leaves to a visitor; `false` if its budget is used up.

@@ -324,6 +324,8 @@ impl<F: Search, T: Tally> Kernel for &mut Walk<'_, '_, F, T> {
         let Walk { one, stack } = self;
         let OneRay { bvh, mesh, ray, interval, cull, bounds, afar, search, tally, resume } = one;
         let (interval, cull, afar) = (*interval, *cull, *afar);
+        // A copy of the view: behind a reference it would be read again after each store.
+        let bvh = &Bvh { ..**bvh };
         let nearby =
             if afar.is_none() { SlabRay::nearby(ray, interval, bounds) } else { afar.copied() };
         let Some((slab_ray, filter)) = nearby else { return Walked::TooFar };
