@@ -207,6 +207,7 @@ impl<'a> Bvh<'a> {
     /// The fine sides of a node, if it has some.
     #[inline(always)]
     fn fine_sides(&self, node: &Node) -> Option<&'a FineSides> {
+        // Ask the bit first: for most nodes that is all there is to do.
         if node.has_fine_sides() { self.fine.get(node.fine_index()) } else { None }
     }
 
