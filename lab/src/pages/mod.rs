@@ -254,7 +254,7 @@ mod tests {
             let page = format!("{BEGIN}sources lab/results/{name}.json -->\n{END}\n");
             fill(&root(), "docs/page.md", &page, &mut Vec::new()).unwrap()
         };
-        let compared = sources("2026-11-28d_zen4_scans");
+        let compared = sources("2026-11-28d_zen4_spheres");
         assert!(
             compared
                 .contains(", compiled for x86_64, AVX-512, commit f0b0a394dc47. `hgrid compare "),
