@@ -45,7 +45,7 @@ fn calls_from_c() {
 /// A number of calls that is small enough for each run of Miri.
 #[test]
 fn a_few_calls_from_c() {
-    run_programs(3, 300);
+    run_programs(2, 300);
 }
 
 #[test]

@@ -24,7 +24,7 @@ pub mod scenes;
 #[cfg(feature = "full")]
 pub mod tools;
 
-/// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/run` sets 16.
+/// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/run` sets 4.
 ///
 /// # Panics
 /// If the value is not a number.
