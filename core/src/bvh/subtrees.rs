@@ -5,6 +5,7 @@
 //! for each unit (a crowded bin, or bins side by side with enough triangles for a subtree):
 //!     too large to sort: new keys, in one grid or two over its centres, and new bins; then their units
 //!     else: sort by key, split where high bits of the key change or in the middle, make a subtree of each part
+//!           (of a large mesh: prefetch the unit's indices before the sort, its corners behind it)
 //!
 //! entries | records of roots | used up | this unit | later units |
 //! spare   | centres of a crowded unit, then second buffer of the sorts | untouched |
@@ -28,7 +29,7 @@ use crate::aabb::Aabb;
 use crate::arena::whole;
 use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
-use crate::simd::{SimdLevel, dispatch};
+use crate::simd::{HAS_PREFETCH, SimdLevel, dispatch, prefetch};
 use crate::tasks::take;
 
 use super::crowd::{self, NewKeys, sort_by_bin};
@@ -64,6 +65,9 @@ struct Binned {
 
 /// A record in entries.
 pub(crate) const RECORD: usize = size_of::<RootRecord>() / size_of::<Entry>();
+
+/// Triangles of the largest mesh whose units are read without prefetches: more do not fit into the caches of one core.
+const CACHED_TRIANGLES: u32 = 150_000;
 
 const _: () = assert!(size_of::<RootRecord>() == 112 && RECORD <= TRIANGLES_PER_SUBTREE);
 
@@ -132,14 +136,34 @@ impl Subtrees<'_> {
                 entry[0] = 0;
             }
         } else {
-            let entries = self.entries.get_mut(range.clone());
-            let spare = self.spare.get_mut(..range.len()).or_bug("no room to sort");
-            let (Some(entries), Some(spare)) = (entries, spare) else { return };
-            let ends = entries.first().zip(entries.last());
-            let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
-            sort(self.simd_level, entries, spare, (32 - differing.leading_zeros()).max(shift));
+            self.sort(&range, shift);
         }
         self.make_subtrees(range);
+    }
+
+    /// Sorts the entries of a unit, and prefetches its triangles. Out of line: nested divisions would each keep its
+    /// variables on the stack.
+    #[inline(never)]
+    fn sort(&mut self, range: &Range<usize>, shift: u32) {
+        let entries = self.entries.get_mut(range.clone());
+        let spare = self.spare.get_mut(..range.len()).or_bug("no room to sort");
+        let (Some(entries), Some(spare)) = (entries, spare) else { return };
+        let (Some(&first), Some(&last)) = (entries.first(), entries.last()) else { return };
+        let differing = first[0] ^ last[0];
+        let is_large = HAS_PREFETCH && self.mesh.triangle_count() > CACHED_TRIANGLES;
+        let near = is_large.then(|| self.mesh.part_around(first[1]));
+        if let Some(near) = near {
+            for &[_, id] in &*entries {
+                let (wide, own) = near.own(id);
+                wide.indices(own).map(prefetch);
+            }
+        }
+        sort(self.simd_level, entries, spare, (32 - differing.leading_zeros()).max(shift));
+        if let Some(near) = near {
+            for &[_, id] in &*entries {
+                near.corners(id).map(|corners| corners.map(prefetch));
+            }
+        }
     }
 
     /// Makes subtrees of the entries of a unit, which are sorted by key. A range of more than [`MOST_SUBTREE`] entries
