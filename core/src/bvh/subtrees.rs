@@ -136,7 +136,7 @@ impl Subtrees<'_> {
                 entry[0] = 0;
             }
         } else {
-            self.sort(&range, shift);
+            self.sort(&range, shift, depth);
         }
         self.make_subtrees(range);
     }
@@ -144,14 +144,15 @@ impl Subtrees<'_> {
     /// Sorts the entries of a unit, and prefetches its triangles. Out of line: nested divisions would each keep its
     /// variables on the stack.
     #[inline(never)]
-    fn sort(&mut self, range: &Range<usize>, shift: u32) {
+    fn sort(&mut self, range: &Range<usize>, shift: u32, depth: u32) {
         let entries = self.entries.get_mut(range.clone());
         let spare = self.spare.get_mut(..range.len()).or_bug("no room to sort");
         let (Some(entries), Some(spare)) = (entries, spare) else { return };
         let (Some(&first), Some(&last)) = (entries.first(), entries.last()) else { return };
         let differing = first[0] ^ last[0];
-        let is_large = HAS_PREFETCH && self.mesh.triangle_count() > CACHED_TRIANGLES;
-        let near = is_large.then(|| self.mesh.part_around(first[1]));
+        // The triangles of a division have just been read.
+        let is_far = depth == 0 && self.mesh.triangle_count() > CACHED_TRIANGLES;
+        let near = (HAS_PREFETCH && is_far).then(|| self.mesh.part_around(first[1]));
         if let Some(near) = near {
             for &[_, id] in &*entries {
                 let (wide, own) = near.own(id);
